@@ -42,25 +42,26 @@ const TESTS: &str = "--tests";
 pub(crate) fn all(more: &[&str]) -> Result<()> {
     let mut tally = Tally::new();
     // What has to come from elsewhere comes while processors build.
-    let built = std::thread::scope(|scope| {
+    let (built, tools) = std::thread::scope(|scope| {
         let needs = scope.spawn(needs);
         let built = build(&mut tally)?;
         tally.stage("what tests need, beside their build");
-        needs.join().unwrap_or_else(|_| bail!("what tests need could not be had: see above"))?;
-        anyhow::Ok(built)
+        let tools = needs.join().unwrap_or_else(|_| bail!("what tests need could not be had: see above"))?;
+        anyhow::Ok((built, tools))
     })?;
-    // Mostly builds, which link for long on one core, and programs of Python, beside tests that wait. Tests with a clock hold
-    // on a loaded machine. The wheel takes packages of others from the build above.
-    let others = [("boards", beside("boards", more)?), ("wheel", beside("wheel", &[])?)];
+    // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
+    let boards = beside("boards", more)?;
+    // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
+    tally.stage("build of the wheel");
+    let wheel = python::Wheel::install(&tools);
     let host = if built { host(&mut tally) } else { Ok(false) };
+    let wheel = wheel.and_then(|wheel| wheel_of(&mut tally, &tools, &wheel));
     // Also where something above could not be run: what runs beside it comes to its end.
-    tally.stage("what runs beside all that");
-    for (verb, other) in others {
-        let (ended, text) = other.output()?;
-        print!("{text}");
-        tally.add(verb, ended, &text);
-    }
-    tally.end(host?)
+    tally.stage("boards, beside all that");
+    let (ended, text) = boards.output()?;
+    print!("{text}");
+    tally.add(ended, &text);
+    tally.end(host? & wheel?)
 }
 
 /// All that runs beside the other tests, alone: the checks for boards, the module of the playground; in CI fuzzing.
@@ -113,12 +114,12 @@ fn tried(tests: Program, built: &Playground) -> Program {
 }
 
 /// Programs, targets and packages of Python that tests need; the interpreter that has the packages.
-fn needs() -> Result<()> {
+fn needs() -> Result<PathBuf> {
     if std::env::var_os("CI").is_some() {
         programs()?;
     }
     targets()?;
-    python::interpreter().map(drop)
+    python::interpreter()
 }
 
 /// Installs the programs without which tests skip themselves on a user's machine.

@@ -137,8 +137,8 @@ impl Tally {
         }
     }
 
-    /// Adds the end of another run of tests, that of a verb beside this one, as [`Tally::end`] printed it.
-    pub(super) fn add(&mut self, verb: &str, ended_well: bool, text: &str) {
+    /// Adds the end of another run of tests, as [`Tally::end`] printed it.
+    pub(super) fn add(&mut self, ended_well: bool, text: &str) {
         let before = self.failed;
         let mut lines = text.lines().rev();
         if let Some(counts) = lines.next() {
@@ -153,10 +153,9 @@ impl Tally {
         }
         let rows =
             text.lines().skip_while(|line| *line != head()).skip(1).take_while(|line| !line.is_empty());
-        self.beside.push(format!("of that `{verb}`, beside:"));
         self.beside.extend(rows.map(str::to_owned));
         if !ended_well && self.failed == before {
-            self.check(&format!("the tests beside, `{verb}`, come to their end"), false);
+            self.check("the tests beside come to their end", false);
         }
     }
 
@@ -186,7 +185,10 @@ impl Tally {
         for (name, time, processor) in self.times.iter().chain([&all]) {
             println!("{:>8} {:>10}  {name}", minutes(*time), minutes(*processor));
         }
-        self.beside.iter().for_each(|row| println!("{row}"));
+        if !self.beside.is_empty() {
+            println!("of that beside tests and wheel:");
+            self.beside.iter().for_each(|row| println!("{row}"));
+        }
         println!();
         for Failure { name, said } in &self.failures {
             println!("{FAILED}{name}");
@@ -238,7 +240,7 @@ mod tests {
 
         // And those of the tests beside, from their text.
         let beside = format!("{FAILED}fuzzing\n{SAYS}panicked\n1 passed, 1 failed, 0 skipped");
-        tally.add("boards", false, &beside);
+        tally.add(false, &beside);
         let last = tally.failures.last().expect("three");
         assert_eq!((last.name.as_str(), &last.said[..]), ("fuzzing", &["panicked".to_owned()][..]));
         assert_eq!((tally.passed, tally.failed), (2, 3));
