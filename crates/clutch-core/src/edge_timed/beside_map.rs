@@ -308,7 +308,7 @@ mod tests {
             let error = ahead.friction.to_f64() / disc(counts + 0.5 * ahead.velocity.to_f64()) - 1.0;
             error * error
         });
-        (squares.sum::<f64>() / half.len() as f64).sqrt()
+        libm::sqrt(squares.sum::<f64>() / half.len() as f64)
     }
 
     fn a_right_map_drives<T: Real>() {
