@@ -110,7 +110,7 @@ impl<T: Real> BesideMap<T> {
     /// As [`EdgeTimed::start`].
     pub(crate) fn start(&self, position: FixedCounts, applied: T, target_velocity: T) -> BesideMapState<T> {
         let mut state = BesideMapState::default();
-        self.plain.start_in(&mut state.plain, position, applied, target_velocity);
+        self.start_in(&mut state, position, applied, target_velocity);
         state
     }
 
