@@ -183,7 +183,7 @@ fn a_program_that_cannot_go_on_is_reset_into_its_boot_code() {
 
 /// A chip in the middle of a run, with a code that is not the one of power-up.
 fn running(image: &Path, role: ChipRole) -> (ChipBoard, u64) {
-    let chip = ChipOptions { until: Some(0.3), ..ChipOptions::default() };
+    let chip = ChipOptions { until: Some(0.05), ..ChipOptions::default() };
     let (_, board) = session(&scenario("smc", 1.5), role, chip).run_board(image).expect("the chip runs");
     assert_ne!(board.code().0, BOOT_CODE);
     let now_ns = board.next_ns().expect("it has a next period");

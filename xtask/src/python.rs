@@ -59,7 +59,8 @@ pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
 /// The profile of the wheel that tests install: packages of others are as in the other tests, and compiled once for both.
 pub(crate) const PROFILE: &str = "dev";
 
-/// Our crates in that wheel are with all optimisations, as in the released one, which `cargo xtask dist` builds and tries.
+/// Our crates in that wheel have the optimisations of the released one, which `cargo xtask dist` builds and tries, but for
+/// clutch-sim, whose level the workspace sets.
 pub(crate) fn optimised(program: Program) -> Program {
     program.env("CARGO_PROFILE_DEV_OPT_LEVEL", "3").env("CARGO_PROFILE_DEV_DEBUG", "none")
 }

@@ -77,7 +77,7 @@ impl Program {
         if !cfg!(unix) {
             return self;
         }
-        let mut nice = program("nice").args(["-n", "5"]).arg(self.0.get_program()).args(self.0.get_args());
+        let mut nice = program("nice").args(["-n", "10"]).arg(self.0.get_program()).args(self.0.get_args());
         nice.0.current_dir(self.0.get_current_dir().unwrap_or(&root()));
         for (key, value) in self.0.get_envs() {
             match value {

@@ -218,7 +218,7 @@ fn host(tally: &mut Tally) -> Result<bool> {
 const EXAMPLES: [&str; 6] = ["write_demo", "bits", "intervals", "ask", "page", "describe"];
 
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
-/// The wheel, with all of them, must give the same bits.
+/// The wheel, with more of them, must give the same bits.
 fn compared() -> Result<()> {
     let mut programs = vec!["--lib", "--bin", "clutch"];
     EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));

@@ -2,7 +2,7 @@
 
 use super::{ChipFault, ChipKind};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use std::io::{Read, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
@@ -139,7 +139,7 @@ pub type Counted = serde_json::Value;
 pub(super) struct Chip {
     child: Child,
     requests: Option<ChildStdin>,
-    answers: ChildStdout,
+    answers: BufReader<ChildStdout>,
     program: String,
     count: Option<PathBuf>,
 }
@@ -170,6 +170,7 @@ impl Chip {
         let (Some(requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(system("started")(std::io::ErrorKind::BrokenPipe.into()));
         };
+        let answers = BufReader::new(answers);
         Ok(Chip { child, requests: Some(requests), answers, program, count: count.map(Path::to_owned) })
     }
 
@@ -209,12 +210,15 @@ impl Chip {
 
     fn read(&mut self, mut into: &mut [u8]) -> Result<(), ChipError> {
         while !into.is_empty() {
-            let patience = Timespec { tv_sec: PATIENCE_S.into(), tv_nsec: 0 };
-            match poll(&mut [PollFd::new(&self.answers, PollFlags::IN)], Some(&patience)) {
-                Ok(0) => return Err(ChipError::Silent),
-                Ok(_) => {}
-                Err(rustix::io::Errno::INTR) => continue,
-                Err(error) => return Err(system("heard")(error.into())),
+            // An answer is mostly there as a whole.
+            if self.answers.buffer().is_empty() {
+                let patience = Timespec { tv_sec: PATIENCE_S.into(), tv_nsec: 0 };
+                match poll(&mut [PollFd::new(self.answers.get_ref(), PollFlags::IN)], Some(&patience)) {
+                    Ok(0) => return Err(ChipError::Silent),
+                    Ok(_) => {}
+                    Err(rustix::io::Errno::INTR) => continue,
+                    Err(error) => return Err(system("heard")(error.into())),
+                }
             }
             let count = self.answers.read(into).map_err(system("heard"))?;
             if count == 0 {
