@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +41,12 @@ class Unit:
         description = fmpy.read_model_description(str(path))
         self.variables = {v.name: v for v in description.modelVariables}
         self.told: list[str] = []
+        # Gone with this instance.
+        folder = tempfile.mkdtemp()
+        weakref.finalize(self, shutil.rmtree, folder)
         self.slave = FMU3Slave(
             guid=description.guid,
-            unzipDirectory=fmpy.extract(str(path)),
+            unzipDirectory=fmpy.extract(str(path), unzipdir=folder),
             modelIdentifier=description.coSimulation.modelIdentifier,
         )
         self.slave.instantiate(
