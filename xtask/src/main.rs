@@ -252,7 +252,11 @@ enum Verb {
 }
 
 fn main() -> Result<()> {
-    match Cli::parse().verb {
+    let verb = Cli::parse().verb;
+    if matches!(verb, Verb::Test | Verb::Ci) {
+        run::without_incremental()?;
+    }
+    match verb {
         Verb::Check => check(),
         Verb::Test => test::all(&[]),
         Verb::Wheel => test::wheel(),

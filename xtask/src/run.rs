@@ -25,6 +25,21 @@ pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
     program(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(args)
 }
 
+/// Starts this program anew where it would compile incrementally, if nobody has asked for that. What is compiled once, in a
+/// tree that is new, would take a minute more.
+pub(crate) fn without_incremental() -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt as _;
+        const KEY: &str = "CARGO_INCREMENTAL";
+        if std::env::var_os(KEY).is_none() {
+            let mut again = Command::new(std::env::current_exe()?);
+            return Err(again.args(std::env::args_os().skip(1)).env(KEY, "0").exec().into());
+        }
+    }
+    Ok(())
+}
+
 /// A verb of this program that runs in the background, its output unseen until the end. It gives way to what else runs:
 /// some tests are of a loop in real time, and no machine has to let them have its priority.
 pub(crate) fn beside(verb: &str, options: &[&str]) -> Result<Beside> {
