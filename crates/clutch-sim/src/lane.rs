@@ -2,9 +2,12 @@
 
 use clutch_core::Arithmetic;
 
+/// Lanes of the widest vector.
+pub(crate) const MOST_LANES: usize = 8;
+
 /// A number, or a vector of them: what flow and figures need besides what laws need.
 pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
-    /// Lanes.
+    /// Lanes, at most [`MOST_LANES`].
     const WIDTH: usize;
     /// Magnitude of what asks an exponential, beyond which a motion goes on alone; 100 below where exponentials end here.
     const EXPONENT: f64;

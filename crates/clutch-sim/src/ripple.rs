@@ -1,6 +1,6 @@
 //! Friction that varies along the disc.
 
-use crate::lane::Lane;
+use crate::lane::{Lane, MOST_LANES};
 use clutch_core::params::{Range, Table};
 use clutch_core::{ParamError, params};
 use rand::{RngExt, SeedableRng};
@@ -180,7 +180,7 @@ impl<T> Ripple<T> {
         T: Lane,
     {
         if let Some(all) = &mut self.band {
-            let bands: [_; 8] = std::array::from_fn(|i| each(i % T::WIDTH)?.band.as_ref());
+            let bands: [_; MOST_LANES] = std::array::from_fn(|i| each(i % T::WIDTH)?.band.as_ref());
             let of = |get: fn(&Band<f64>) -> f64| T::of(|i| bands[i].map_or(0.0, get));
             all.amplitude = of(|band| band.amplitude);
             all.spacing = of(|band| band.spacing);

@@ -7,7 +7,7 @@ use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
 use super::silence::Silence;
 use super::vector::InLanes;
 use crate::detected::STAIR;
-use crate::lane::Lane;
+use crate::lane::{Lane, MOST_LANES};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, Sampled, Sticks};
 use crate::run::REPORT_EVERY;
 use clutch_core::reference::Reference;
@@ -136,7 +136,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
                 }
             }
             Paths::Each(paths) => {
-                let mut all = [Target::default(); 8];
+                let mut all = [Target::default(); MOST_LANES];
                 for (target, path) in all.iter_mut().zip(paths) {
                     *target = path.at(k);
                 }

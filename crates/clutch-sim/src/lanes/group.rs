@@ -5,6 +5,7 @@ use super::motion::Alike;
 use super::servo::Steered;
 use super::vector::at;
 use crate::engine::EngineKind;
+use crate::lane::MOST_LANES;
 use crate::metrics::{Detected, Metrics};
 use crate::run::{Prepared, RunSpec};
 use clutch_core::law::LawParams;
@@ -17,8 +18,6 @@ use std::mem::{Discriminant, discriminant};
 const BLOCK: usize = 256;
 /// Periods of all runs of a block together, so that each block ends within a second or so.
 const LONGEST: u64 = 1 << 22;
-/// Lanes of the widest vector.
-pub(super) const MOST_LANES: usize = 8;
 /// Runs below which lanes would stay empty: they are faster alone.
 const FEWEST: usize = 3;
 

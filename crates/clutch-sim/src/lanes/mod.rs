@@ -1,8 +1,8 @@
-//! Many runs at once: eight of them in the lanes of a vector, each with the bits of its run alone. Shafts under the voltages
+//! Many runs at once: two, four or eight of them in the lanes of a vector, each with the bits of its run alone. Shafts under the voltages
 //! of agents ([`Fleet`](crate::Fleet)) go through a period by the same code.
 //!
 //! ```text
-//! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
+//! rows of a sweep ─► group (same law, same length, …) ─► block of chunks, a vector each
 //!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run; servos one by one
 //!                                                     │                          where they have no lanes
 //!                                                     └─► quadrature, series     in lanes, the runs in the layer

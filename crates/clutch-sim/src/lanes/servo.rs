@@ -1,7 +1,6 @@
 //! Servos of shafts in lanes: sensor, filter (5), law, converter.
 
-use super::group::MOST_LANES;
-use crate::lane::{Lane, each};
+use crate::lane::{Lane, MOST_LANES, each};
 use crate::run::RunSpec;
 use clutch_core::law::{self, ControlLaw, Law, LawState, Seen, Tick};
 use clutch_core::{
