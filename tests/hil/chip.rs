@@ -44,7 +44,8 @@ fn scenario(law: &str, duration: f64) -> Scenario {
     let text = format!(
         "name = \"{law} at 2 °/s\"\n[rig]\nbase = \"paper\"\nencoder.counts_per_rev = 20000\ndac.bits = 12\n\
          dac.lowest_v = 0.0\ndac.highest_v = 10.0\n[law.{law}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
-         [sampling]\nscalar = \"f32\"\n[run]\nduration_s = {duration:?}\nstart = \"rest\"\n\
+         [sampling]\nscalar = \"f32\"\n[run]\nduration_s = {duration:?}\nsettle_s = 0.1\n\
+         start = \"rest\"\n\
          [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 4.501953125\n\
          [safety.limits]\nfollowing_error_deg = 5.0\n"
     );
@@ -153,7 +154,7 @@ fn a_law_on_this_machine_through_the_chip_is_the_simulation_bit_for_bit() {
 /// A run in which something breaks on the chip; `at` s after arming, or at power-up.
 fn broken(image: &Path, role: ChipRole, kind: ChipFaultKind, at: Option<f64>) -> ChipReport {
     let chip = ChipOptions { faults: vec![ChipFault { kind, at }], ..ChipOptions::default() };
-    session(&scenario("smc", 1.5), role, chip).run(image).expect("the chip runs")
+    session(&scenario("smc", 0.5), role, chip).run(image).expect("the chip runs")
 }
 
 /// Ends of control and of the board: state of the supervisor, cause, state of the board.

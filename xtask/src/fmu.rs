@@ -20,7 +20,8 @@ pub(crate) fn pack(scenario: Option<&Path>) -> Result<PathBuf> {
 pub(crate) fn of_built(scenario: Option<&Path>, folder: &str) -> Result<PathBuf> {
     let built = root().join("target").join(folder);
     let out = root().join("target/fmu");
-    let libraries = [(SYSTEM, built.join("libclutch_fmi.so"))];
+    // There it is also where only what depends on it was asked for.
+    let libraries = [(SYSTEM, built.join("deps/libclutch_fmi.so"))];
     packed(scenario, &built.join("examples/describe"), &libraries, &out)?;
     Ok(out)
 }
@@ -52,7 +53,8 @@ pub(crate) fn packed(
             std::fs::create_dir_all(&binaries)?;
             let name = library.file_name().context("a library's file")?.to_string_lossy();
             // Named after the model.
-            std::fs::copy(library, binaries.join(name.trim_start_matches("lib")))?;
+            std::fs::copy(library, binaries.join(name.trim_start_matches("lib")))
+                .with_context(|| library.display().to_string())?;
         }
         let archive = out.join(name);
         let zip = program("python3").within(&unit).args(["-m", "zipfile", "-c"]).arg(&archive);

@@ -25,14 +25,11 @@ const SKIPPED_WITHOUT_TARGETS: u64 =
     4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
 
 /// The packages that are built for this machine, the command with all its options. Always the same selection: with another
-/// one cargo gives libraries other features, and compiles them once more. The wheel's module only links inside of Python.
-const WORKSPACE: [&str; 5] = [
-    "--workspace",
-    "--exclude",
-    "clutch-py",
-    "--features",
-    "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope",
-];
+/// one cargo gives libraries other features, and compiles them once more. The wheel's module, which only links inside of
+/// Python, is among them, so that the wheel finds most packages of others compiled; it has no test, and no `--lib` may ask
+/// for it.
+const WORKSPACE: [&str; 3] =
+    ["--workspace", "--features", "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope"];
 
 /// What is tested: all that says so in its manifest. Examples that no test runs are left to `check`, which compiles them,
 /// too, and does not link each with the whole house.
@@ -220,7 +217,7 @@ const EXAMPLES: [&str; 6] = ["write_demo", "bits", "intervals", "ask", "page", "
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
 /// The wheel, with more of them, must give the same bits.
 fn compared() -> Result<()> {
-    let mut programs = vec!["--lib", "--bin", "clutch"];
+    let mut programs = vec!["--bin", "clutch"];
     EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));
     cargo(["build"]).args(WORKSPACE).args(programs).run()
 }
