@@ -1,6 +1,6 @@
 //! Fuzzing, with cargo-fuzz.
 
-use crate::proof::add_row;
+use crate::proof::{add_row, grouped};
 use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
 use std::time::Instant;
@@ -27,15 +27,23 @@ impl Watched {
             Watched::Panics => "none",
         }
     }
+
+    /// In the table of docs/proof.md.
+    fn name(self) -> &'static str {
+        match self {
+            Watched::Memory => "panics, memory",
+            Watched::Panics => "panics",
+        }
+    }
 }
 
 /// Fuzzes every target, or only one, for `seconds` each; or for so many executions, told in docs/proof.md.
-pub(crate) fn all(seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
+pub(crate) fn all(watched: Watched, seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
     install()?;
     for (target, _) in TARGETS.iter().filter(|(t, _)| only.is_none_or(|o| o == *t)) {
         match executions {
-            None if one(target, Watched::Memory, &[&format!("-max_total_time={seconds}")])? => {}
-            Some(executions) => counted(target, executions)?,
+            None if one(target, watched, &[&format!("-max_total_time={seconds}")])? => {}
+            Some(executions) => counted(target, watched, executions)?,
             None => bail!("fuzzing {target} found something: see above"),
         }
     }
@@ -43,20 +51,25 @@ pub(crate) fn all(seconds: u32, executions: Option<u64>, only: Option<&str>) -> 
 }
 
 /// Fuzzes one target in steps, so that a run that is ended early has told what it did.
-fn counted(target: &str, executions: u64) -> Result<()> {
+fn counted(target: &str, watched: Watched, executions: u64) -> Result<()> {
     const STEP: u64 = 10_000_000;
     let (begun, mut done) = (Instant::now(), 0);
     let mut held = true;
     while held && done < executions {
         let step = STEP.min(executions - done);
-        held = one(target, Watched::Memory, &[&format!("-runs={step}")])?;
+        held = one(target, watched, &[&format!("-runs={step}")])?;
         done += step;
         println!("{target}: {done} executions, {} s", begun.elapsed().as_secs());
     }
     let corpus = std::fs::read_dir(root().join("target/corpus").join(target))?.count();
     let found = if held { "nothing" } else { "an input: see target/" };
     let seconds = begun.elapsed().as_secs();
-    add_row("fuzz", &format!("| `{target}` | {done} | {seconds} s | {corpus} | {found} |"))?;
+    let watched = watched.name();
+    let row = format!(
+        "| `{target}` | {watched} | {} | {seconds} s | {corpus} | {found} |",
+        grouped(&done.to_string())
+    );
+    add_row("fuzz", &row)?;
     if held { Ok(()) } else { bail!("fuzzing {target} found something: see above") }
 }
 

@@ -113,6 +113,9 @@ enum Verb {
         /// Only this target.
         #[arg(long)]
         target: Option<String>,
+        /// Watches for panics alone, not for each access of memory: some times as fast.
+        #[arg(long)]
+        panics: bool,
     },
     /// Measures the coverage of core and wire by the tests of core, wire and node, and holds it against its floors; writes
     /// the table of docs/proof.md. Installs cargo-llvm-cov.
@@ -280,7 +283,10 @@ fn main() -> Result<()> {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
         }
-        Verb::Fuzz { seconds, executions, target } => fuzz::all(seconds, executions, target.as_deref()),
+        Verb::Fuzz { seconds, executions, target, panics } => {
+            let watched = if panics { fuzz::Watched::Panics } else { fuzz::Watched::Memory };
+            fuzz::all(watched, seconds, executions, target.as_deref())
+        }
         Verb::Coverage => coverage::run(),
         Verb::Prove { names } => proof::prove(&names),
         Verb::Mutants { shard } => mutants::run(&shard),

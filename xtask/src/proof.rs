@@ -95,7 +95,7 @@ fn doc(source: &str, item: &str) -> Result<String> {
 }
 
 /// Digits in threes.
-fn grouped(digits: &str) -> String {
+pub(crate) fn grouped(digits: &str) -> String {
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
