@@ -21,7 +21,7 @@ pub(crate) fn add_row(name: &str, row: &str) -> Result<()> {
     let rest = page.split_once(&begin).map(|(_, rest)| rest);
     let table = rest.and_then(|rest| rest.split_once(&format!("<!-- {name}:end -->")));
     let (table, _) = table.with_context(|| format!("{PAGE} has lost the markers of {name}"))?;
-    write_between(name, &format!("{}\n{row}", table.trim()))
+    write_between(name, format!("{}\n{row}", table.trim()).trim_start())
 }
 
 /// Installs a command of cargo where it is missing.
