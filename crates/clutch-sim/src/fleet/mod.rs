@@ -11,6 +11,7 @@ mod tests;
 pub(crate) use shaft::Begun;
 
 use crate::engine::EngineError;
+use crate::lane::MOST_LANES;
 use crate::lanes::fleet::{Gathered, Together};
 use crate::run::room;
 use crate::scenario::Scenario;
@@ -127,7 +128,7 @@ impl Fleet {
         let begun = seeds.iter().map(|seed| Begun::new(scenario, *seed).map_err(wrong));
         let mut begun = begun.collect::<Result<Vec<_>, _>>()?.into_iter();
         let of_a_thread = seeds.len().div_ceil(rayon::current_num_threads());
-        let together = of_a_thread.next_multiple_of(8).clamp(TOGETHER, BLOCK);
+        let together = of_a_thread.next_multiple_of(MOST_LANES).clamp(TOGETHER, BLOCK);
         let mut blocks = Vec::new();
         while begun.len() > 0 {
             let some = begun.by_ref().take(together).collect();

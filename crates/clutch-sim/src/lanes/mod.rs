@@ -1,5 +1,5 @@
-//! Many runs at once: two, four or eight of them in the lanes of a vector, each with the bits of its run alone. Shafts under the voltages
-//! of agents ([`Fleet`](crate::Fleet)) go through a period by the same code.
+//! Many runs at once: two, four or eight of them in the lanes of a vector, each with the bits of its run alone. Shafts under
+//! the voltages of agents ([`Fleet`](crate::Fleet)) go through a period by the same code.
 //!
 //! ```text
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks, a vector each

@@ -1,5 +1,6 @@
-//! The vector: as many doubles as a register of the processor holds. Wider ones, of several registers, were up to a fifth
-//! faster with SSE2 alone, but slower on uneven discs, and took half as long again to compile.
+//! The vector: as many doubles as a register of the processor holds. Eight, in several registers where they have to be, were
+//! up to a fifth faster with SSE, but on uneven discs mostly slower, by up to nine tenths, and with AVX2 little different on
+//! even ones; and this crate took a quarter longer to compile.
 //!
 //! The only unsafe code of this crate: a vector of a set of instructions is made out of nothing, as [`Arithmetic`] asks, and
 //! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made. Nothing outside
