@@ -31,8 +31,18 @@ fn environment(requirements: &str) -> Result<PathBuf> {
     if !python.exists() {
         make_environment("python3".as_ref(), &venv, &[])?;
     }
+    // Uncompiled: a third of the time, and most of what packages bring is never imported.
     program(&python)
-        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", requirements])
+        .args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-compile",
+            "-r",
+            requirements,
+        ])
         .run()?;
     Ok(python)
 }

@@ -99,7 +99,7 @@ pub(crate) fn of_playground(built: &Playground) -> Result<()> {
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
     let tests = program(python::interpreter()?).args(pytest);
     let tests = tests.arg(root().join("python/tests/test_playground.py"));
-    tried(tests, built).env("CLUTCH_BIN", command()).env("PYTHONDONTWRITEBYTECODE", "1").run()
+    tried(tests, built).env("CLUTCH_BIN", command()).run()
 }
 
 /// Tests that are told of a playground.
@@ -413,6 +413,5 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
         .env("CLUTCH_BITS", bits)
         .env("CLUTCH_FMU", units)
         .env("CLUTCH_INTERVALS", example("intervals"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))
 }
