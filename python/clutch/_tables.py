@@ -1731,7 +1731,7 @@ class EdgeTimed(_Params):
     lag_s : float, default 0.0
         Time constant of the actuator, as believed; 0 for one without a lag. `τ`: a finite number of at least
         0 s; a time below 1000 times sampling.period_us.
-    friction_doubt : float, default 0.5
+    friction_doubt : float, default 0.25
         Standard deviation of friction at the start, as a share of the model's. A number above 0 and at most
         10.
     ripple_share : float, default 0.15
@@ -1768,7 +1768,7 @@ class EdgeTimed(_Params):
 
     delay_ticks: int = 0
     lag_s: float = 0.0
-    friction_doubt: float = 0.5
+    friction_doubt: float = 0.25
     ripple_share: float = 0.15
     ripple_waves_per_turn: float = 340.0
     ripple_damping: float = 0.2

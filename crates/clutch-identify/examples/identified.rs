@@ -16,7 +16,7 @@ use std::error::Error;
 type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Discs on which no number of the law was chosen.
-const DISCS: std::ops::Range<u64> = 3001..3041;
+const DISCS: std::ops::Range<u64> = 9001..9041;
 /// Inertia − 20 %, friction − 20 %, load + 10 %.
 const RIG: &str = "[rig]\nbase = \"bench\"\ninertia_kg_m2 = 0.00136\n\n[rig.friction.stribeck]\nmu_static = 0.1624\n\
     mu_dynamic = 0.0832\n\n[rig.drive.weight]\nmass_kg = 0.23034\n";

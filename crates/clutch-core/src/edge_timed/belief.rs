@@ -250,18 +250,14 @@ impl<T: Real> Belief<T> {
         [self.tt, self.tw, self.th, self.tr, self.ts]
     }
 
-    /// The position was measured, with a variance: what it was off by, squared, and the variance of that. A measurement far
-    /// beyond what is believed widens the belief first.
+    /// The position was measured, with a variance: what it was off by, squared, and the variance of that. However far it is
+    /// off, the belief is not widened: what a shaft that runs away does between two edges tells its friction.
     #[inline(never)]
     pub(super) fn correct(&mut self, measured: T, variance: T) -> Surprise<T> {
         let y = measured - self.motion.position;
-        let surprise = Surprise { square: y * y, variance: self.tt + variance };
-        if y * y > T::splat(25.0) * (self.tt + variance) {
-            self.tt += y * y;
-            self.ww += T::splat(0.25) * (y * y);
-        }
-        self.take(self.at_position(), self.tt + variance, y, T::ONE);
-        surprise
+        let s = self.tt + variance;
+        self.take(self.at_position(), s, y, T::ONE);
+        Surprise { square: y * y, variance: s }
     }
 
     /// No edge has come: the position is below `end` (`side` 1) or above it (`side` −1). The belief becomes the normal

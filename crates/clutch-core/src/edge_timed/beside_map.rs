@@ -181,14 +181,14 @@ impl<T: Real> BesideMap<T> {
         state: &mut BesideMapState<T>,
         (position, place): (FixedCounts, &Place<T>),
         applied: T,
-        target_velocity: T,
+        velocities: (T, T),
     ) {
         let begins = Self::look(state, place);
-        self.plain.update(&mut state.plain, position, applied, target_velocity);
+        self.plain.update_on(&mut state.plain, position, applied, velocities, None);
         if begins {
             self.begin_mapped(state, place);
         } else if state.map_counts() {
-            self.update_mapped(state, position, applied, target_velocity);
+            self.update_mapped(state, position, applied, velocities);
         }
     }
 
@@ -221,9 +221,9 @@ impl<T: Real> BesideMap<T> {
         state: &mut BesideMapState<T>,
         position: FixedCounts,
         applied: T,
-        target_velocity: T,
+        velocities: (T, T),
     ) {
-        self.mapped.update_on(&mut state.mapped, position, applied, target_velocity, Some(&state.place));
+        self.mapped.update_on(&mut state.mapped, position, applied, velocities, Some(&state.place));
         let (plain, mapped) = (state.plain.surprise(), state.mapped.surprise());
         if plain.variance > T::ZERO && mapped.variance > T::ZERO {
             let says =
@@ -291,7 +291,7 @@ mod tests {
             let place =
                 map.map_or_else(Place::default, |points| FrictionMap::new(0, 4, points).unwrap().at(read));
             let applied = T::from_f64(volts / disc(counts - 0.5 * pace));
-            f.update(&mut state, (read, &place), applied, rate);
+            f.update(&mut state, (read, &place), applied, (rate, T::ZERO));
             states.push(state);
         }
         states
@@ -351,7 +351,7 @@ mod tests {
         let points = points(0.0);
         let read = FixedCounts::from_counts(200);
         let place = FrictionMap::new(0, 4, &points).unwrap().at(read);
-        f.update(&mut state, (read, &place), 2.0, 0.035);
+        f.update(&mut state, (read, &place), 2.0, (0.035, 0.0));
         assert_eq!(state.part(), TRIED);
     }
 
@@ -362,7 +362,7 @@ mod tests {
         let state = ride::<f64>(Some(&points), 1500)[1499];
         let told = |counts: i64| {
             let (mut state, read) = (state, FixedCounts::from_counts(counts));
-            f.update(&mut state, (read, &map.at(read)), 2.2, 0.035);
+            f.update(&mut state, (read, &map.at(read)), 2.2, (0.035, 0.0));
             let (filter, belief, place) = f.driving(&state);
             filter.ahead_on(belief, place).friction
         };
@@ -378,7 +378,7 @@ mod tests {
         let read = FixedCounts::from_counts(state.plain.counts);
         let place = FrictionMap::new(0, 4, &points).unwrap().at(read);
         for _ in 0..60 {
-            f.update(&mut state, (read, &place), 4.0, 0.035);
+            f.update(&mut state, (read, &place), 4.0, (0.035, 0.0));
         }
         assert!(state.plain.rests() && state.mapped.rests());
         f.let_go(&mut state, 0.035);

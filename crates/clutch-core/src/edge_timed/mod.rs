@@ -35,7 +35,7 @@ crate::params! {
         /// Time constant of the actuator, as believed; 0 for one without a lag.
         lag: T = 0.0, "lag_s" "τ" S, Range::at_least(0.0);
         /// Standard deviation of friction at the start, as a share of the model's.
-        friction_doubt: T = 0.5, "friction_doubt" "" NONE, Range::above(0.0).up_to(10.0);
+        friction_doubt: T = 0.25, "friction_doubt" "" NONE, Range::above(0.0).up_to(10.0);
         /// Root mean square of the ripple along the disc, as a share of friction.
         ripple: T = 0.15, "ripple_share" "" NONE, Range::above(0.0).up_to(1.0);
         /// Waves of the ripple per turn.
@@ -144,6 +144,8 @@ pub struct EdgeTimedState<T> {
     pad: T,
     /// Periods since the last edge, or since the shaft was let go.
     silent: T,
+    /// Counts that it was to gain on the path since.
+    gains: T,
     /// Periods for which the shaft has still to be let go.
     release: T,
     /// Rests, of which each four edges make up for one.
@@ -172,6 +174,11 @@ impl<T: Real> EdgeTimedState<T> {
     #[must_use]
     pub fn lets_go(&self) -> bool {
         self.release > T::ZERO
+    }
+
+    /// `true` for some edges after a rest.
+    pub(crate) fn has_rested(&self) -> bool {
+        self.rests > T::ZERO
     }
 
     /// Friction, as a multiple of the model's, and its variance.
@@ -371,7 +378,7 @@ impl<T: Real> EdgeTimed<T> {
         let periods = needed.min(self.longest_release) + T::splat(0.7) * self.lag_periods;
         // To the nearest whole number; one at least.
         state.release = (periods + T::splat(0.5)).floor().max(T::ONE);
-        state.silent = T::ZERO;
+        (state.silent, state.gains) = (T::ZERO, T::ZERO);
         state.phase = Phase::Starting;
     }
 
@@ -541,11 +548,12 @@ impl<T: Real> EdgeTimed<T> {
         belief.friction.hh = belief.friction.hh * (T::ONE - share);
         (belief.friction.hr, belief.friction.hs) = (T::ZERO, T::ZERO);
         belief.motion.position = position;
+        state.rests = state.rests.max(T::ONE);
         // Known to the way of a step or two.
         belief.tt = T::splat(0.02);
         belief.friction.know(belief.friction.mean, self.ripple * belief.friction.mean);
         state.at_edge = state.belief.friction;
-        state.silent = T::ZERO;
+        (state.silent, state.gains) = (T::ZERO, T::ZERO);
         state.release = T::ZERO;
         state.phase = Phase::Resting;
     }
@@ -577,17 +585,18 @@ impl<T: Real> EdgeTimed<T> {
         applied: T,
         target_velocity: T,
     ) {
-        self.update_on(state, position, applied, target_velocity, None);
+        self.update_on(state, position, applied, (target_velocity, T::ZERO), None);
     }
 
-    /// As [`EdgeTimed::update`], where friction is known beside its mean: around the count of this sample.
+    /// As [`EdgeTimed::update`], where friction is known beside its mean: around the count of this sample. `gains`: counts
+    /// that the shaft was to gain on the path in the period, 0 or more, which shorten the silence that is taken for a rest.
     #[inline(never)]
     pub(crate) fn update_on(
         &self,
         state: &mut EdgeTimedState<T>,
         position: FixedCounts,
         applied: T,
-        target_velocity: T,
+        (target_velocity, gains): (T, T),
         place: Option<&Place<T>>,
     ) {
         let (moved, volts) = self.hear(state, position, applied);
@@ -610,6 +619,7 @@ impl<T: Real> EdgeTimed<T> {
             self.crossed(state, moved, way);
         } else {
             state.silent += T::ONE;
+            state.gains += gains;
             // It says nothing about where a shaft rests.
             if state.phase != Phase::Resting {
                 let backward = state.belief.motion.velocity < T::ZERO;
@@ -645,7 +655,7 @@ impl<T: Real> EdgeTimed<T> {
             state.surprise = surprise;
         }
         state.at_edge = belief.friction;
-        state.silent = T::ZERO;
+        (state.silent, state.gains) = (T::ZERO, T::ZERO);
         state.release = T::ZERO;
         state.rests = (state.rests - T::splat(0.25)).max(T::ZERO);
         state.phase = Phase::Sliding;
@@ -654,15 +664,19 @@ impl<T: Real> EdgeTimed<T> {
 
     /// `true` if a shaft would have crossed an edge by now: one that follows the path, or, where that rests, one that
     /// has not yet stopped.
-    fn too_long(&self, silent: T, pace: T) -> bool {
-        if pace.abs() > T::ZERO { silent * pace.abs() > self.silence } else { silent > self.patience }
+    fn too_long(&self, state: &EdgeTimedState<T>, pace: T) -> bool {
+        if pace.abs() > T::ZERO {
+            state.silent * pace.abs() + state.gains > self.silence
+        } else {
+            state.silent > self.patience
+        }
     }
 
     /// A shaft that is silent for too long rests. `pace`: the path's velocity, counts per period.
     fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T, place: Option<&Place<T>>) {
         match state.phase {
             Phase::Resting => {}
-            Phase::Sliding if self.too_long(state.silent, pace) => {
+            Phase::Sliding if self.too_long(state, pace) => {
                 // All learnt since the last edge is the friction of a shaft at rest.
                 state.belief.friction = state.at_edge;
                 state.belief.rest();
@@ -675,7 +689,7 @@ impl<T: Real> EdgeTimed<T> {
             Phase::Sliding => {}
             Phase::Starting if state.release > T::ZERO && pace.abs() > T::ZERO => {
                 state.release -= T::ONE;
-                state.silent = T::ZERO;
+                (state.silent, state.gains) = (T::ZERO, T::ZERO);
             }
             // A path that has come to rest leaves nothing to be let go for.
             Phase::Starting if state.release > T::ZERO => state.release = T::ZERO,

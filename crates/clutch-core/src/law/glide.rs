@@ -75,11 +75,15 @@ pub struct GlideState<T> {
     /// 1 once the filters have begun, else 0.
     begun: T,
     steps: MicroStepState<T>,
+    /// Counts that the shaft was to gain on the path in the last period.
+    gains: T,
     output: OutputState<T>,
 }
 
 /// Share of the believed friction with which a resting shaft is held.
 const HELD: f64 = 0.5;
+/// Share of the velocity that is asked for with which an edge is waited for behind a rest.
+const HURRIED: f64 = 0.7;
 /// Multiple of the believed friction at rest with which a motor starts.
 const PUSHED: f64 = 1.1;
 
@@ -210,11 +214,11 @@ impl<T: Real> Glide<T> {
             if state.steps.active() {
                 self.leave_steps(&mut state.steps, filters);
             }
-            self.filters.update(filters, (position, place), applied, tick.target_velocity);
+            self.filters.update(filters, (position, place), applied, (tick.target_velocity, state.gains));
         } else {
             self.filters.start_in(filters, position, applied, tick.target_velocity);
         }
-        self.demand(filters, tick)
+        self.demand(filters, &mut state.gains, tick)
     }
 
     /// Steps have ended where they have: the filters go on from there.
@@ -227,7 +231,7 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period, V, and terms.
     #[inline(never)]
-    fn demand(&self, filters: &mut BesideMapState<T>, tick: &Tick<T>) -> Command<T, [T; 7]> {
+    fn demand(&self, filters: &mut BesideMapState<T>, gains: &mut T, tick: &Tick<T>) -> Command<T, [T; 7]> {
         let (filter, belief, place) = self.filters.driving(filters);
         let ahead = filter.ahead_on(belief, place);
         let pace = filter.per_period(tick.target_velocity);
@@ -242,6 +246,9 @@ impl<T: Real> Glide<T> {
         let belief = filters.driving();
         let p = &self.params;
         let wanted = way * (fast + self.kp * way * error).limit(p.floor * fast, p.cap * fast);
+        // A shaft that has just rested may soon do so again, and is missed the more the farther it is behind.
+        let hurried = T::splat(HURRIED) * wanted.abs() - fast;
+        *gains = if belief.has_rested() { hurried.max(T::ZERO) } else { T::ZERO };
         let friction = if belief.starts() {
             ahead.friction + p.optimism * ahead.variance.sqrt()
         } else {
@@ -283,7 +290,7 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
         // The first period's demand does not depend on where the shaft is.
         let mut filters = self.filters.start(FixedCounts(0), applied, tick.target_velocity);
-        let demand = self.demand(&mut filters, tick).voltage;
+        let demand = self.demand(&mut filters, &mut T::default(), tick).voltage;
         let seen = Seen { applied, ..Seen::default() };
         GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
     }
@@ -359,7 +366,7 @@ mod tests {
         // One period brings it to 1.6 °/s.
         assert_eq!(law.update(&mut state, &tick).voltage, 0.0);
         let after = law.update(&mut state, &tick);
-        // 2.24 V with the model's friction, a standard deviation of 52 % fewer.
+        // 2.24 V with the model's friction, a standard deviation of 29 % fewer.
         assert!(after.voltage > 1.2 && after.voltage < 1.9, "{} V", after.voltage);
         assert_eq!(after.terms[5], 1.0, "started");
     }

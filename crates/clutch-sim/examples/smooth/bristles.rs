@@ -32,9 +32,9 @@ pub(super) fn bristles() -> Outcome<()> {
     for counts in BEND {
         for rate in RATES {
             let scenario = scenario(rate, counts);
-            let s = Summary::of(&runs_of(&scenario, &[], 3001..3041)?);
+            let s = Summary::of(&runs_of(&scenario, &[], 9001..9041)?);
             let first = [("run.duration_s", 1.0), ("run.settle_s", 0.0)];
-            let first = Summary::of(&runs_of(&scenario, &first, 3001..3041)?);
+            let first = Summary::of(&runs_of(&scenario, &first, 9001..9041)?);
             println!(
                 "| {counts} counts | {rate} °/s | {} | {} | {:.0} | {:.3}° | {:.4}° | {} % | {:.0} | {} | {:.0} |",
                 shown(s.cycles),

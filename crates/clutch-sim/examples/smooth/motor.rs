@@ -90,7 +90,7 @@ pub(super) fn runs(
 /// Candidates of the search, discs that they are tried on, and discs of the table.
 const CANDIDATES: usize = 150;
 const TRIED_ON: Range<i64> = 1..4;
-const DISCS: Range<i64> = 3001..3011;
+const DISCS: Range<i64> = 9001..9011;
 
 /// PID with the least largest error of seeded candidates, each with a share of the feed-forward of friction.
 fn tuned(axis: &Axis, path: &str) -> Outcome<String> {

@@ -17,7 +17,7 @@ const HAND: &str =
     "[rig.drive.hand]\nmean_nm = 0.05\nrms_nm = 0.008\nlowest_frequency_hz = 0.2\nhighest_frequency_hz = 5.0";
 
 /// Discs of the motor axis.
-const MOTOR_DISCS: Range<i64> = 3001..3011;
+const MOTOR_DISCS: Range<i64> = 9001..9011;
 
 /// Cells of a law on `bench`.
 fn on_bench(law: &str, discs: &Range<i64>) -> Outcome<String> {
@@ -62,7 +62,7 @@ pub(super) fn troubles() -> Outcome<()> {
         println!(
             "| {} | {} | {} |",
             law.title,
-            on_bench(law.scenario, &(3001..3041))?,
+            on_bench(law.scenario, &(9001..9041))?,
             reversal(law.scenario, false)?
         );
         if law.scenario == GLIDE {
