@@ -6,7 +6,7 @@ const LESSON = [
   { title: "Sliding mode sticks less", laws: ["pd", "smc"], set: {},
     says: "Sliding mode slips through most of it, and pays: its largest error is nearly four times PD’s. Thin the boundary layer, and the sticks come back." },
   { title: "Glide does not", laws: ["pd", "smc", "glide"], set: {},
-    says: "Glide times the encoder’s edges, learns friction from them and inverts it: no stick, less than an eighth of PD’s largest error, a quiet voltage." },
+    says: "Glide times the encoder’s edges, learns friction from them and inverts it: no stick, less than a seventh of PD’s largest error, a quiet voltage." },
   { title: "A wrong belief", laws: ["glide"], set: { "model.friction.stribeck.mu_static": "0.07", "model.friction.stribeck.mu_dynamic": "0.05" },
     says: "Glide believes half of the friction that there is, and hardly minds: it learns. A wrong delay is another matter: raise the rig’s to 3 periods, then what glide believes of it." },
   { title: "Faster: 20 °/s", laws: ["pd", "smc", "glide"], set: { "reference.ramp.rate_deg_s": "20" },
