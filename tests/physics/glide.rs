@@ -4,13 +4,22 @@
 use clutch_sim::{Metrics, Scenario};
 use toml::Value;
 
+/// The built-in scenario.
+fn bench() -> toml::Table {
+    clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap().toml.parse().unwrap()
+}
+
 /// Runs of the built-in scenario with keys changed, one for each disc from `first` on.
 fn discs(first: i64, n: i64, keys: &[(&str, Value)]) -> Vec<Metrics> {
-    let base = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap();
+    discs_of(&bench(), first, n, keys)
+}
+
+/// As [`discs`], of any scenario.
+fn discs_of(base: &toml::Table, first: i64, n: i64, keys: &[(&str, Value)]) -> Vec<Metrics> {
     let run = |seed| {
         let mut set = vec![("run.seed".to_owned(), Value::Integer(seed))];
         set.extend(keys.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
-        let scenario = Scenario::from_table("glide", base.toml.parse().unwrap(), &set).unwrap();
+        let scenario = Scenario::from_table("glide", base.clone(), &set).unwrap();
         scenario.run(clutch_sim::Keep::Figures, clutch_sim::progress::UNWATCHED).unwrap().metrics
     };
     (first..first + n).map(run).collect()
@@ -84,13 +93,15 @@ fn from_rest_it_is_smooth_within_150_ms_whatever_friction_it_believes() {
         ];
         discs(1, 50, &keys)
     };
-    for times in [1.0, 0.614] {
+    // Table 1; 1.4 and 0.6 times the friction of the bench, 0.104: one that holds too little loses a start more often.
+    for (times, sticks) in [(1.0, 0.8), (0.971, 0.8), (0.416, 1.3)] {
         let all = start(0.0, times);
         assert!(most(&all, |m| m.stick_slip_cycles_per_s) <= 4.0);
         let mean = all.iter().map(|m| m.stick_slip_cycles_per_s).sum::<f64>() / 50.0;
-        assert!(mean <= 1.0, "{mean} sticks");
-        assert!(most(&all, |m| m.max_error_rad).to_degrees() <= 0.15);
-        assert_eq!(most(&start(0.15, times), |m| m.stick_time_fraction), 0.0);
+        assert!(mean <= sticks, "{times}: {mean} sticks");
+        let error = most(&all, |m| m.max_error_rad).to_degrees();
+        assert!(error <= 0.13, "{times}: {error}°");
+        assert_eq!(most(&start(0.15, times), |m| m.stick_time_fraction), 0.0, "{times}");
     }
 }
 
@@ -114,10 +125,37 @@ fn below_the_rates_at_which_it_slides_it_steps_by_parts_of_a_count() {
     assert!(error <= 0.02, "{error}°");
 }
 
+#[test]
+fn paths_that_begin_and_end_at_rest_or_crawl_and_a_load_that_grows_keep_within_0_15_degrees() {
+    let part = |toml: &str| Value::Table(toml.parse().unwrap());
+    let below = ("law.glide.micro_below_deg_s", Value::Float(0.95));
+    let along = |path: &str| {
+        let mut table = bench();
+        table.insert("reference".into(), part(path));
+        table
+    };
+    let jerk = along("[minimum_jerk]\ndistance_deg = 20.0\nduration_s = 10.0\n");
+    let from_rest = [
+        ("run.start", "rest".into()),
+        ("run.duration_s", 11.0.into()),
+        ("run.settle_s", 0.0.into()),
+        below.clone(),
+    ];
+    let sine = along("[sine]\nrate_deg_s = 2.0\namplitude_deg = 0.95493\nfrequency_hz = 0.25\n");
+    let twenty = [("run.duration_s", 20.0.into()), below];
+    // 15 % more weight after 3 s.
+    let grows = "[table]\npoints_s_nm = [[0.0, 0.0493011], [3.0, 0.0493011], [3.001, 0.0566963]]\n";
+    let mut loaded = bench();
+    loaded["rig"].as_table_mut().unwrap().insert("drive".into(), part(grows));
+    for (scenario, keys) in [(jerk, &from_rest[..]), (sine, &twenty), (loaded, &[])] {
+        let error = most(&discs_of(&scenario, 1, 40, keys), |m| m.max_error_rad).to_degrees();
+        assert!(error <= 0.15, "{:?}, {:?}: {error}°", scenario["reference"], scenario["rig"]);
+    }
+}
+
 /// A path of two moves with a rest of eight seconds after each, on a rig that differs from `bench` by keys.
 fn two_moves(keys: &[(&str, Value)], seed: i64) -> clutch_sim::Run {
-    let base = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap();
-    let mut table: toml::Table = base.toml.parse().unwrap();
+    let mut table = bench();
     let path = "[table]\npoints_s_deg = [[0, 0], [5, 10], [13, 10], [18, 20], [26, 20]]\n";
     table.insert("reference".into(), Value::Table(path.parse().unwrap()));
     let mut set = vec![

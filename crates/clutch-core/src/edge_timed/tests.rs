@@ -103,6 +103,31 @@ fn a_shaft_that_is_silent_for_three_counts_rests_and_its_friction_is_that_before
 }
 
 #[test]
+fn counts_that_it_was_to_gain_on_the_path_shorten_the_silence() {
+    let rate = 2.0_f64.to_radians();
+    let (state, _) = steady::<f64>(rate, 2000);
+    let f = filter::<f64>();
+    let at = FixedCounts::from_counts(state.counts);
+    let silence = |gains: f64| {
+        let mut state = state;
+        let mut periods = state.silent as i32;
+        while !state.rests() {
+            f.update_on(&mut state, at, 2.2, (rate, gains), None);
+            periods += 1;
+            assert!(periods < 100, "never");
+        }
+        periods
+    };
+    // The path goes 0.111 counts in a period, and it was to gain 0.1 on that in each since, of which one had none.
+    assert_eq!((silence(0.0), silence(0.1)), (28, 16));
+    // What it gained up to an edge is forgotten there.
+    let mut moved = state;
+    f.update_on(&mut moved, at, 2.2, (rate, 2.9), None);
+    f.update_on(&mut moved, FixedCounts::from_counts(state.counts + 1), 2.2, (rate, 0.0), None);
+    assert_eq!((moved.gains, moved.silent, moved.rests()), (0.0, 0.0, false));
+}
+
+#[test]
 fn a_shaft_that_stays_at_rest_with_the_path_teaches_nothing() {
     let rate = 2.0_f64.to_radians();
     for scalar_is_single in [false, true] {
