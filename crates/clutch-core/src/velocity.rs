@@ -148,4 +148,26 @@ mod tests {
         }
         assert!((rate - (path - shaft)).to_degrees().abs() < 0.2, "{} °/s", rate.to_degrees());
     }
+
+    #[cfg(feature = "linalg")]
+    #[test]
+    fn each_source_starts_with_the_velocity_of_the_path() {
+        let plant = Plant::new(&PlantParams::default()).unwrap();
+        let target = Target { velocity: 0.035, ..Target::default() };
+        let state = |p: &VelocityParams<f64>| {
+            let source = VelocitySource::new(p, &plant, Encoder::PAPER, Micros(1000)).unwrap();
+            source.start(FixedCounts(0), &target, 2.24)
+        };
+        let observer = ObserverParams::default();
+        assert_eq!(state(&VelocityParams::Observer(observer)).observer, {
+            Observer::new(&observer, &plant, Encoder::PAPER, Micros(1000))
+                .unwrap()
+                .start(FixedCounts(0), 0.035)
+        });
+        let edges = EdgeTimedParams::default();
+        assert_eq!(state(&VelocityParams::EdgeTimed(edges)).edge_timed, {
+            let filter = EdgeTimed::new(&edges, &plant, Encoder::PAPER, Micros(1000)).unwrap();
+            filter.start(FixedCounts(0), 2.24, 0.035)
+        });
+    }
 }

@@ -66,4 +66,22 @@ mod tests {
             None
         );
     }
+
+    #[test]
+    fn a_clock_that_was_right_for_long_and_is_now_wrong_is_found_within_seconds() {
+        let mut pace = Pace::default();
+        assert!((0..1_000_000).all(|_| pace.pass(1000, 1000, 0).is_none()), "a thousand seconds");
+        // A tenth more: as soon as that is a twentieth of all that is remembered, which is 4.2 s at most.
+        let found = (1..10_000).find_map(|n| pace.pass(1000, 1100, 0).map(|more| (n, more)));
+        let (periods, more) = found.expect("never");
+        assert!((1000..4300).contains(&periods) && more > 0, "after {periods} periods, {more} µs");
+    }
+
+    #[test]
+    fn a_twentieth_and_the_slack_are_borne() {
+        assert_eq!(Pace::default().pass(1000, 1050, 0), None);
+        assert_eq!(Pace::default().pass(1000, 1051, 0), Some(51));
+        assert_eq!(Pace::default().pass(1000, 1060, 10), None);
+        assert_eq!(Pace::default().pass(1000, 939, 10), Some(-61));
+    }
 }
