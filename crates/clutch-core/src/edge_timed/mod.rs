@@ -11,11 +11,12 @@
 //!
 //! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a
 //! uniform distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer
-//! than the path may take for `silence_counts`, and sooner if it was to gain on the path, is taken to rest: friction learnt since the last edge is forgotten, as
-//! it is that of a shaft at rest, and the filter says so ([`EdgeTimedState::starts`]), so that a law can let the brake go
-//! for some periods. If then no edge comes in 25 ms (and twice the lag, and the delay), friction is above what the
-//! voltage would have carried; and if that has failed twice, a brake is let go until an edge comes. A single count back
-//! of a shaft that only a brake holds is none: a channel that is dead counts to and fro.
+//! than the path may take for `silence_counts`, and sooner if it was to gain on the path, is taken to rest: friction
+//! learnt since the last edge is forgotten, as it is that of a shaft at rest, and the filter says so
+//! ([`EdgeTimedState::starts`]), so that a law can let the brake go for some periods. If then no edge comes in 25 ms
+//! (and twice the lag, and the delay), friction is above what the voltage would have carried; and if that has failed
+//! twice, a brake is let go until an edge comes. A single count back of a shaft that only a brake holds is none: a
+//! channel that is dead counts to and fro.
 
 mod belief;
 mod beside_map;
