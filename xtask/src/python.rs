@@ -31,7 +31,7 @@ fn environment(requirements: &str) -> Result<PathBuf> {
     if !python.exists() {
         make_environment("python3".as_ref(), &venv, &[])?;
     }
-    // Uncompiled: a third of the time, and most of what packages bring is never imported.
+    // Uncompiled, which takes a third less time: most of what packages bring is never imported.
     program(&python)
         .args([
             "-m",

@@ -149,7 +149,6 @@ mod tests {
         assert!((rate - (path - shaft)).to_degrees().abs() < 0.2, "{} °/s", rate.to_degrees());
     }
 
-    #[cfg(feature = "linalg")]
     #[test]
     fn each_source_starts_with_the_velocity_of_the_path() {
         let plant = Plant::new(&PlantParams::default()).unwrap();

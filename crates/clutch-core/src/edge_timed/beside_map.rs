@@ -174,21 +174,22 @@ impl<T: Real> BesideMap<T> {
         self.mapped.take_over(&mut state.mapped, position, mean);
     }
 
-    /// As [`EdgeTimed::update`], of both; `place`: friction around the shaft, by the map.
+    /// As [`EdgeTimed::update_on`], of both; `place`: friction around the shaft, by the map; `path`: its velocity, and what
+    /// the shaft was to gain on it.
     #[inline(never)] // of a name, for a board's bound
     pub(crate) fn update(
         &self,
         state: &mut BesideMapState<T>,
         (position, place): (FixedCounts, &Place<T>),
         applied: T,
-        velocities: (T, T),
+        path: (T, T),
     ) {
         let begins = Self::look(state, place);
-        self.plain.update_on(&mut state.plain, position, applied, velocities, None);
+        self.plain.update_on(&mut state.plain, position, applied, path, None);
         if begins {
             self.begin_mapped(state, place);
         } else if state.map_counts() {
-            self.update_mapped(state, position, applied, velocities);
+            self.update_mapped(state, position, applied, path);
         }
     }
 
@@ -216,14 +217,8 @@ impl<T: Real> BesideMap<T> {
     }
 
     #[inline(never)] // likewise
-    fn update_mapped(
-        &self,
-        state: &mut BesideMapState<T>,
-        position: FixedCounts,
-        applied: T,
-        velocities: (T, T),
-    ) {
-        self.mapped.update_on(&mut state.mapped, position, applied, velocities, Some(&state.place));
+    fn update_mapped(&self, state: &mut BesideMapState<T>, position: FixedCounts, applied: T, path: (T, T)) {
+        self.mapped.update_on(&mut state.mapped, position, applied, path, Some(&state.place));
         let (plain, mapped) = (state.plain.surprise(), state.mapped.surprise());
         if plain.variance > T::ZERO && mapped.variance > T::ZERO {
             let says =

@@ -1,7 +1,7 @@
 //! Glide on a brake with bristles: the table `bristles` of docs/smooth.md.
 
 use super::laws::GLIDE;
-use super::{Outcome, Summary, runs_of, shown};
+use super::{FRESH, Outcome, Summary, runs_of, shown};
 
 /// Way on which the bristles bend at the friction of rest, counts.
 const BEND: [f64; 5] = [0.2, 0.5, 1.0, 2.0, 5.0];
@@ -32,9 +32,9 @@ pub(super) fn bristles() -> Outcome<()> {
     for counts in BEND {
         for rate in RATES {
             let scenario = scenario(rate, counts);
-            let s = Summary::of(&runs_of(&scenario, &[], 9001..9041)?);
+            let s = Summary::of(&runs_of(&scenario, &[], FRESH)?);
             let first = [("run.duration_s", 1.0), ("run.settle_s", 0.0)];
-            let first = Summary::of(&runs_of(&scenario, &first, 9001..9041)?);
+            let first = Summary::of(&runs_of(&scenario, &first, FRESH)?);
             println!(
                 "| {counts} counts | {rate} °/s | {} | {} | {:.0} | {:.3}° | {:.4}° | {} % | {:.0} | {} | {:.0} |",
                 shown(s.cycles),

@@ -14,11 +14,17 @@ use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Keep, Metrics};
 use laws::GLIDE;
 use std::error::Error;
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use toml::{Table, Value};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Discs on which no number of the law was chosen.
+const FRESH: Range<i64> = 9001..9041;
+/// The fewer of the motor axis.
+const FRESH_MOTORS: Range<i64> = 9001..9011;
 
 /// The rate below which glide goes in micro-steps, where it does, °/s.
 const STEPS_BELOW: (&str, f64) = ("law.glide.micro_below_deg_s", 0.95);
@@ -74,12 +80,12 @@ const BELIEFS: &[(&str, [f64; 2])] = &[
 ];
 
 /// Runs of a law on `bench` along a ramp, one for each seed.
-fn runs(law: &str, keys: &[(&str, f64)], seeds: std::ops::Range<i64>) -> Outcome<Vec<Metrics>> {
+fn runs(law: &str, keys: &[(&str, f64)], seeds: Range<i64>) -> Outcome<Vec<Metrics>> {
     runs_of(&format!("[rig]\nbase = \"bench\"\n\n{law}\n\n[reference.ramp]\nrate_deg_s = 2.0\n"), keys, seeds)
 }
 
 /// Runs of a scenario without a name, one for each seed.
-fn runs_of(scenario: &str, keys: &[(&str, f64)], seeds: std::ops::Range<i64>) -> Outcome<Vec<Metrics>> {
+fn runs_of(scenario: &str, keys: &[(&str, f64)], seeds: Range<i64>) -> Outcome<Vec<Metrics>> {
     let mut base: Table = format!("name = \"smooth\"\n\n{scenario}").parse()?;
     let mut names: Vec<String> = vec!["run.seed".into()];
     names.extend(keys.iter().map(|(key, _)| (*key).to_owned()));
@@ -150,13 +156,13 @@ fn plants() -> Outcome<()> {
     println!("| the rig | cycles/s | discs of 40 | largest error | RMS | V/s |");
     println!("|---|---|---|---|---|---|");
     for (title, keys) in PLANTS {
-        print_row(title, &runs(GLIDE, keys, 9001..9041)?);
+        print_row(title, &runs(GLIDE, keys, FRESH)?);
     }
     let minute = [("run.duration_s", 61.0)];
     for (title, scalar) in
         [("a minute each", ""), ("a minute each, `f32`", "\n\n[sampling]\nscalar = \"f32\"")]
     {
-        print_row(title, &runs(&format!("{GLIDE}{scalar}"), &minute, 9001..9041)?);
+        print_row(title, &runs(&format!("{GLIDE}{scalar}"), &minute, FRESH)?);
     }
     Ok(())
 }

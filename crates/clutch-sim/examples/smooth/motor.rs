@@ -1,7 +1,7 @@
 //! A motor axis, glide beside PID with feed-forward of Coulomb friction: the table `motor` of docs/smooth.md.
 
 use super::laws::GLIDE;
-use super::{Outcome, STEPS_BELOW, Summary, runs_of, shown};
+use super::{FRESH_MOTORS, Outcome, STEPS_BELOW, Summary, runs_of, shown};
 use clutch_sim::smooth_speed::law_keys;
 use clutch_sim::{Metrics, Scenario};
 use rand::{RngExt, SeedableRng};
@@ -87,10 +87,9 @@ pub(super) fn runs(
     runs_of(&format!("{AXIS}\n{law}\n\n{path}\n"), &keys, seeds)
 }
 
-/// Candidates of the search, discs that they are tried on, and discs of the table.
+/// Candidates of the search, and discs that they are tried on.
 const CANDIDATES: usize = 150;
 const TRIED_ON: Range<i64> = 1..4;
-const DISCS: Range<i64> = 9001..9011;
 
 /// PID with the least largest error of seeded candidates, each with a share of the feed-forward of friction.
 fn tuned(axis: &Axis, path: &str) -> Outcome<String> {
@@ -124,8 +123,8 @@ pub(super) fn motor() -> Outcome<()> {
         for (i, stribeck) in [0.001, 0.003, 0.01].into_iter().enumerate() {
             let axis = Axis { counts, stribeck };
             let print = |title: &str, [ramp, sine]: [&str; 2], more: &[(&str, f64)]| -> Outcome<()> {
-                let a = Summary::of(&runs(&axis, ramp, AT_2, more, DISCS)?);
-                let b = Summary::of(&runs(&axis, sine, TO_AND_FRO, more, DISCS)?);
+                let a = Summary::of(&runs(&axis, ramp, AT_2, more, FRESH_MOTORS)?);
+                let b = Summary::of(&runs(&axis, sine, TO_AND_FRO, more, FRESH_MOTORS)?);
                 let figures = |s: &Summary| (format!("{:.4}° | {:.4}°", s.error, s.rms), shown(s.cycles));
                 let ends = |s: &Summary| format!("{} % | {:.0}", shown(100.0 * s.stuck), s.travel);
                 let ((errors, sticks), (errors_b, sticks_b)) = (figures(&a), figures(&b));

@@ -2,7 +2,7 @@
 
 use super::laws::GLIDE;
 use super::motor::{self, Axis, TEXT_BOOK, TO_AND_FRO};
-use super::{Outcome, STEPS_BELOW, Summary, runs, runs_of, shown};
+use super::{FRESH, FRESH_MOTORS, Outcome, STEPS_BELOW, Summary, runs, runs_of, shown};
 use clutch_sim::Metrics;
 
 /// Rates of the ramps, °/s.
@@ -58,23 +58,23 @@ pub(super) fn steps() -> Outcome<()> {
     for rate in RATES {
         let mut keys = vec![("reference.ramp.rate_deg_s", rate)];
         keys.extend(time(rate));
-        let without = runs(GLIDE, &keys, 9001..9041)?;
+        let without = runs(GLIDE, &keys, FRESH)?;
         keys.push(STEPS_BELOW);
-        print_row(&format!("{rate} °/s"), &runs(GLIDE, &keys, 9001..9041)?, Some(&without));
+        print_row(&format!("{rate} °/s"), &runs(GLIDE, &keys, FRESH)?, Some(&without));
     }
     for (title, rig) in RIGS {
         let rate = 0.5;
         let mut keys = vec![("reference.ramp.rate_deg_s", rate)];
         keys.extend(time(rate));
         keys.extend_from_slice(rig);
-        let without = runs(GLIDE, &keys, 9001..9041)?;
+        let without = runs(GLIDE, &keys, FRESH)?;
         keys.push(STEPS_BELOW);
-        print_row(&format!("0.5 °/s, {title}"), &runs(GLIDE, &keys, 9001..9041)?, Some(&without));
+        print_row(&format!("0.5 °/s, {title}"), &runs(GLIDE, &keys, FRESH)?, Some(&without));
     }
     let single = format!("{GLIDE}\n\n[sampling]\nscalar = \"f32\"");
     let rate = ("reference.ramp.rate_deg_s", 0.5);
-    let without = runs(&single, &[rate], 9001..9041)?;
-    print_row("0.5 °/s, `f32`", &runs(&single, &[rate, STEPS_BELOW], 9001..9041)?, Some(&without));
+    let without = runs(&single, &[rate], FRESH)?;
+    print_row("0.5 °/s, `f32`", &runs(&single, &[rate, STEPS_BELOW], FRESH)?, Some(&without));
     Ok(())
 }
 
@@ -96,12 +96,12 @@ pub(super) fn motions() -> Outcome<()> {
     println!("|---|---|---|---|---|---|---|");
     for (title, path) in BRAKE {
         let scenario = format!("[rig]\nbase = \"bench\"\n\n{GLIDE}\n\n{path}\n");
-        print_row(title, &runs_of(&scenario, &[STEPS_BELOW], 9001..9041)?, None);
-        print_row("the same without steps", &runs_of(&scenario, &[], 9001..9041)?, None);
+        print_row(title, &runs_of(&scenario, &[STEPS_BELOW], FRESH)?, None);
+        print_row("the same without steps", &runs_of(&scenario, &[], FRESH)?, None);
     }
     for stribeck in [0.001, 0.003, 0.01] {
         let axis = Axis { counts: 20_000.0, stribeck };
-        let runs = |law, more: &[(&str, f64)]| motor::runs(&axis, law, TO_AND_FRO, more, 9001..9011);
+        let runs = |law, more: &[(&str, f64)]| motor::runs(&axis, law, TO_AND_FRO, more, FRESH_MOTORS);
         let title = format!("motor, 0.5 °/s to and fro, v_s {stribeck} rad/s");
         print_row(&title, &runs(GLIDE, &[STEPS_BELOW])?, None);
         print_row("the same without steps", &runs(GLIDE, &[])?, None);

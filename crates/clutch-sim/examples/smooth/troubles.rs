@@ -2,7 +2,7 @@
 
 use super::laws::{GLIDE, LAWS};
 use super::motor::{self, Axis};
-use super::{Outcome, STEPS_BELOW, Summary, runs_of, shown};
+use super::{FRESH, FRESH_MOTORS, Outcome, STEPS_BELOW, Summary, runs_of, shown};
 use std::ops::Range;
 
 /// The weight's torque on `bench`, N m, by 15 % more from 3 s on.
@@ -15,9 +15,6 @@ const AGAIN: f64 = 0.3;
 /// A hand instead of the weight.
 const HAND: &str =
     "[rig.drive.hand]\nmean_nm = 0.05\nrms_nm = 0.008\nlowest_frequency_hz = 0.2\nhighest_frequency_hz = 5.0";
-
-/// Discs of the motor axis.
-const MOTOR_DISCS: Range<i64> = 9001..9011;
 
 /// Cells of a law on `bench`.
 fn on_bench(law: &str, discs: &Range<i64>) -> Outcome<String> {
@@ -49,7 +46,7 @@ fn reversal(law: &str, steps: bool) -> Outcome<String> {
     let (law, gains) = motor::of_brake(law)?;
     let mut keys: Vec<(&str, f64)> = gains.iter().map(|(key, value)| (&key[..], *value)).collect();
     keys.extend(steps.then_some(STEPS_BELOW));
-    let s = Summary::of(&motor::runs(&axis, &law, motor::TO_AND_FRO, &keys, MOTOR_DISCS)?);
+    let s = Summary::of(&motor::runs(&axis, &law, motor::TO_AND_FRO, &keys, FRESH_MOTORS)?);
     Ok(format!("{}, {:.3}°", shown(s.cycles), s.error))
 }
 
@@ -62,7 +59,7 @@ pub(super) fn troubles() -> Outcome<()> {
         println!(
             "| {} | {} | {} |",
             law.title,
-            on_bench(law.scenario, &(9001..9041))?,
+            on_bench(law.scenario, &FRESH)?,
             reversal(law.scenario, false)?
         );
         if law.scenario == GLIDE {
