@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-class _Friction(_Params):
+class Friction(_Params):
     """Friction as a function of the velocity, and under the laboratory's experiments."""
 
     def _scenario(self) -> _clutch.Scenario:
@@ -84,30 +84,6 @@ class _Friction(_Params):
         return {
             name: Table({first.get(name, "rate_nm_s"): set_, "coefficient": mu}) for name, (set_, mu) in found.items()
         }
-
-
-class StribeckFriction(_Friction):
-    """Stribeck's curve."""
-
-
-class CoulombFriction(_Friction):
-    """Coulomb's friction."""
-
-
-class LugreFriction(_Friction):
-    """LuGre friction."""
-
-
-class DahlFriction(_Friction):
-    """Dahl's friction."""
-
-
-class ElastoPlasticFriction(_Friction):
-    """Elasto-plastic friction."""
-
-
-class MaxwellFriction(_Friction):
-    """Generalised Maxwell slip."""
 
 
 class BrakeGeometry(_Params):

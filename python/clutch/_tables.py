@@ -580,7 +580,7 @@ Actuator = BrakeActuator | BrakeGeometry | MotorActuator | BothActuator
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class StribeckFriction(_mixins.StribeckFriction):
+class StribeckFriction(_mixins.Friction):
     """Dry friction of pad on disc, Stribeck's curve (2). The defaults are Table 1's.
 
     `μ(θ̇) = [μ_d + (μ_s − μ_d) exp(−|θ̇/θ̇_s|^δ)] sgn(θ̇)`. A static coefficient below the dynamic one is
@@ -622,7 +622,7 @@ class StribeckFriction(_mixins.StribeckFriction):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class CoulombFriction(_mixins.CoulombFriction):
+class CoulombFriction(_mixins.Friction):
     """Coulomb's friction with a level at rest: `μ = μ_d sgn(θ̇)` in motion, up to `μ_s` at rest.
 
     Parameters
@@ -653,7 +653,7 @@ class CoulombFriction(_mixins.CoulombFriction):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class LugreFriction(_mixins.LugreFriction):
+class LugreFriction(_mixins.Friction):
     """LuGre friction: `ż = θ̇ − σ_0 |θ̇| z/g(θ̇)`, `μ = σ_0 z + σ_1 ż`, with Stribeck's curve `g`. It needs
     the engine `bristle`.
 
@@ -698,7 +698,7 @@ class LugreFriction(_mixins.LugreFriction):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class DahlFriction(_mixins.DahlFriction):
+class DahlFriction(_mixins.Friction):
     """Dahl's friction: `ż = θ̇ (1 − σ_0 z sgn(θ̇)/μ_d)`, `μ = σ_0 z`. It needs the engine `bristle`.
 
     Parameters
@@ -728,7 +728,7 @@ class DahlFriction(_mixins.DahlFriction):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class ElastoPlasticFriction(_mixins.ElastoPlasticFriction):
+class ElastoPlasticFriction(_mixins.Friction):
     """Elasto-plastic friction: LuGre's bristles, which only bend and do not slide below a coefficient `μ_e`.
     It needs the engine `bristle`.
 
@@ -777,7 +777,7 @@ class ElastoPlasticFriction(_mixins.ElastoPlasticFriction):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class MaxwellFriction(_mixins.MaxwellFriction):
+class MaxwellFriction(_mixins.Friction):
     """Generalised Maxwell slip: up to eight springs side by side that hold up to their shares of the friction
     and then slide. It needs the engine `bristle`.
 

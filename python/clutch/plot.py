@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from clutch._clutch import Table
     from clutch._log import Log
-    from clutch._mixins import _Friction
+    from clutch._mixins import Friction
     from clutch._model import Scenario, StribeckFriction
     from clutch._paper import PaperFigure
     from clutch._run import Result
@@ -841,7 +841,7 @@ def _refined(
 
 
 @_styled
-def friction(*frictions: _Friction, labels: Sequence[str] | None = None) -> Figure:
+def friction(*frictions: Friction, labels: Sequence[str] | None = None) -> Figure:
     """Draw frictions under the four experiments of the laboratory: the same figure as ``clutch friction plot``.
 
     Parameters
@@ -1064,16 +1064,6 @@ def _envelope(
 
 
 _STATES = ("Disconnected", "Ready", "Armed", "Running", "Holding", "Released", "Faulted")
-_COUNTERS = (
-    "lost",
-    "late",
-    "duplicated",
-    "reordered",
-    "rejected_frames",
-    "rejected_samples",
-    "deadline_misses",
-    "log_dropped",
-)
 
 
 @_styled
@@ -1211,7 +1201,8 @@ def _counters(ax: Axes, link: Table) -> None:
     """Faults on the link, added up; only those that occurred."""
     from matplotlib.ticker import MaxNLocator
 
-    bad = [name for name in _COUNTERS if link[name].any()]
+    # Each column of the record but when it was made, and what came as it should.
+    bad = [name for name in link if name not in ("tick", "time_s", "received") and link[name].any()]
     for name, colour in zip(bad, _COLOURS + _COLOURS, strict=False):
         ax.step(link["time_s"], link[name], where="post", color=colour, label=name.replace("_", " "))
     if bad:

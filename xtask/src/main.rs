@@ -8,6 +8,7 @@ mod elsewhere;
 mod firmware;
 mod fmu;
 mod fuzz;
+mod generate;
 mod libclutch;
 mod miri;
 mod mutants;
@@ -240,8 +241,8 @@ enum Verb {
         #[arg(value_name = "REV", default_value = "HEAD")]
         revisions: Vec<String>,
     },
-    /// Writes what follows from the declarations of parameters and figures: Python's classes, tables of the
-    /// documentation, the schema of scenario files. A test compares them.
+    /// Writes what follows from declarations and is kept: Python's classes, tables of the documentation, the schema of
+    /// scenario files, headers for C, test vectors of the wire. Tests compare them.
     Generate {
         /// Only compares.
         #[arg(long)]
@@ -328,14 +329,10 @@ fn main() -> Result<()> {
         Verb::Notebooks => notebooks(),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),
-        Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
+        Verb::Generate { check } => generate::run(check),
         Verb::Figures => figures(),
         Verb::Screenshots => screenshots(),
     }
-}
-
-fn generate(args: &[&str]) -> Result<()> {
-    cargo(["run", "--package", "clutch-sim", "--example", "generate", "--"]).args(args).run()
 }
 
 fn check() -> Result<()> {
@@ -499,11 +496,8 @@ fn table_in(package: &str, example: &str, args: &[&str]) -> Result<String> {
 fn write_between(page: &str, name: &str, text: &str) -> Result<()> {
     let file = root().join(page);
     let old = std::fs::read_to_string(&file)?;
-    let (begin, end) = (format!("<!-- {name}:begin -->"), format!("<!-- {name}:end -->"));
-    let split = old.split_once(&begin).and_then(|(head, rest)| Some((head, rest.split_once(&end)?.1)));
-    let (head, tail) = split.with_context(|| format!("{page} has lost the markers of its {name}"))?;
-    std::fs::write(file, format!("{head}{begin}\n{text}\n{end}{tail}"))?;
-    Ok(())
+    let new = generate::between(&old, name, text).with_context(|| page.to_owned())?;
+    Ok(std::fs::write(file, new)?)
 }
 
 fn campaign(runs: u64, seed: u64, resume: Option<PathBuf>, only: &[String]) -> Result<()> {

@@ -30,9 +30,9 @@ pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_metrics.py", "cargo xtask generate"),
     ("python/clutch/_tables.py", "cargo xtask generate"),
     ("docs/scenario.schema.json", "cargo xtask generate"),
-    ("crates/clutch-wire/include/clutch_wire.h", "cargo run -p clutch-wire --example table -- header"),
-    ("crates/clutch-c/include/clutch.h", "cargo run -p clutch-c --example header"),
-    ("tests/wire/vectors.csv", "cargo run -p clutch-wire --example table -- vectors"),
+    ("crates/clutch-wire/include/clutch_wire.h", "cargo xtask generate"),
+    ("crates/clutch-c/include/clutch.h", "cargo xtask generate"),
+    ("tests/wire/vectors.csv", "cargo xtask generate"),
 ];
 
 /// A file of product code.

@@ -1,7 +1,7 @@
 //! The settings of a run: one tree of parameters, each declared once, and the keys that follow.
 
 use clutch_core::law::{LawParams, OutputParams, ShellParams};
-use clutch_core::params::{ChoiceInfo, Conversion, Info, Kind, NONE, Range, Row, TableInfo};
+use clutch_core::params::{ChoiceInfo, Conversion, Info, Kind, NONE, Range, Row, TableInfo, Unit};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{
     Bounds, DacParams, EncoderParams, FNV_64, LimitParams, PlantParams, SafeState, SamplingParams,
@@ -318,6 +318,19 @@ impl Setting {
         match self.declared {
             Declared::Row(row, _) => row.unit.si,
             Declared::Choice(_) => "",
+        }
+    }
+
+    /// The unit that people are shown with its value: both ends of an interval have that of the interval's key.
+    pub(crate) fn shown_unit(&self) -> Unit {
+        let Declared::Row(row, _) = self.declared else {
+            return NONE;
+        };
+        let within = self.name.used.checked_sub(2).and_then(|i| self.name.parts.get(i));
+        match within.and_then(|key| Unit::of_key(key)) {
+            // What the wire carries is SI: the unit of a key that is converted is not the number's.
+            Some(unit) if row.unit == NONE && unit.conversion == Conversion::None => *unit,
+            _ => row.unit,
         }
     }
 

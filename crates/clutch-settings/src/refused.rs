@@ -64,7 +64,7 @@ impl fmt::Display for Refusing<'_> {
             Declared::Row(row, table) => {
                 match usize::try_from(relation).ok().and_then(|n| table.relations.get(n.checked_sub(1)?)) {
                     Some(relation) => f.write_str(relation.expected),
-                    None => row.range.words(row.kind, &row.unit, false).fmt(f),
+                    None => row.range.words(row.kind, &setting.shown_unit(), false).fmt(f),
                 }
             }
         }

@@ -77,8 +77,8 @@ impl<V: Visit> Walk<V> {
     }
 }
 
-/// One more than the most options of a choice: the last place is that of an option that is none.
-const MOST: usize = 12;
+/// More than the options of any choice: the last place is that of an option that is none.
+const MOST: usize = 24;
 
 /// Keys of the choice `C` that are skipped when an option is chosen: before its first row, and behind its last.
 struct Skipped<C>(PhantomData<C>);

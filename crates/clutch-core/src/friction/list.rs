@@ -14,6 +14,14 @@ macro_rules! frictions {
             }
         }
 
+        impl<T: Real> FrictionParams<T> {
+            /// Each model of the list, with its defaults.
+            #[must_use]
+            pub fn all() -> [Self; [$(stringify!($model)),+].len()] {
+                [$(FrictionParams::$model($params::default())),+]
+            }
+        }
+
         /// A checked friction: whichever model was chosen.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum Friction<T> {

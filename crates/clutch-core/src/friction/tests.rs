@@ -4,19 +4,6 @@ use super::*;
 use crate::params::{Choice, Params};
 use std::vec::Vec;
 
-fn all() -> Vec<FrictionParams<f64>> {
-    let all: Vec<FrictionParams<f64>> = std::vec![
-        StribeckParams::default().into(),
-        CoulombParams::default().into(),
-        LugreParams::default().into(),
-        DahlParams::default().into(),
-        ElastoPlasticParams::default().into(),
-        MaxwellParams::default().into(),
-    ];
-    assert_eq!(all.len(), FrictionParams::<f64>::CHOICE.options.len(), "a model is missing here");
-    all
-}
-
 /// Parameters of four elements.
 fn four<V: Copy + Default>(each: [V; 4]) -> [V; ELEMENTS] {
     core::array::from_fn(|i| each.get(i).copied().unwrap_or_default())
@@ -24,12 +11,12 @@ fn four<V: Copy + Default>(each: [V; 4]) -> [V; ELEMENTS] {
 
 /// The four frictions with bristles.
 fn bristled() -> Vec<Bristles<f64>> {
-    all().iter().filter_map(|p| Friction::build(p).unwrap().bristles()).collect()
+    FrictionParams::all().iter().filter_map(|p| Friction::build(p).unwrap().bristles()).collect()
 }
 
 #[test]
 fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
-    for (place, p) in all().iter().enumerate() {
+    for (place, p) in FrictionParams::<f64>::all().iter().enumerate() {
         let f = Friction::<f64>::build(p).unwrap();
         assert_eq!((&f.params(), p.chosen()), (p, place));
         assert_eq!((f.sliding(), f.level(100.0)), (0.15, 0.15), "{}", p.name());
@@ -61,7 +48,7 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
         assert_eq!(p.cast::<f32>().cast::<f32>(), p.cast::<f32>());
     }
     let named = |p: fn(&Friction<f64>) -> bool| -> Vec<&str> {
-        all().iter().filter(|q| p(&Friction::build(q).unwrap())).map(Choice::name).collect()
+        FrictionParams::all().iter().filter(|q| p(&Friction::build(q).unwrap())).map(Choice::name).collect()
     };
     assert_eq!(named(|f| f.quick().is_some()), ["stribeck", "dahl"]);
     assert_eq!(named(|f| f.exponential().is_some()), ["stribeck", "coulomb"]);
@@ -82,9 +69,9 @@ fn a_level_of_zero_is_a_friction_and_no_divisor() {
 
 #[test]
 fn frictions_of_different_models_are_not_one() {
-    let [one, other] = [0, 1].map(|i| Friction::<f64>::build(all().get(i).unwrap()).unwrap());
+    let [one, other] = [0, 1].map(|i| Friction::<f64>::build(FrictionParams::all().get(i).unwrap()).unwrap());
     assert!(Friction::<f64>::in_lanes::<f64>(&|get| get(&one)).is_some_and(|f| f == one));
-    for p in all() {
+    for p in FrictionParams::<f64>::all() {
         let f = Friction::<f64>::build(&p).unwrap();
         assert_eq!(Friction::<f64>::in_lanes::<f64>(&|get| get(&f)), Some(f), "{}", p.name());
     }

@@ -4,12 +4,11 @@
 
 use crate::desk::{PATHS, Plan, paper};
 use clutch_core::law::{LawParams, OutputParams, PdParams};
-use clutch_core::params::{Conversion, Kind, Range, Row, Unit};
+use clutch_core::params::{Conversion, KG_M2, Kind, NM, NM_S_RAD, NM_V, Range, Row, Unit};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::{
-    ActuatorParams, BothActuator, Bounds, BrakeGeometry, CoulombParams, DahlParams, ElastoPlasticParams,
-    FixedCounts, FrictionParams, LugreParams, MaxwellParams, MotorActuator, PlantParams, SafeState,
-    ServoParams, SupervisorParams, Tolerances,
+    ActuatorParams, BothActuator, Bounds, BrakeGeometry, FixedCounts, FrictionParams, MotorActuator,
+    PlantParams, SafeState, ServoParams, SupervisorParams, Tolerances,
 };
 use clutch_settings::{Declared, MAX_KNOTS, Misfit, Refusing, SETTINGS, Setting, Settings};
 use std::collections::BTreeSet;
@@ -53,14 +52,8 @@ fn plans() -> Vec<Plan> {
     let table = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear });
     let paths = [ReferenceParams::Hold, table].into_iter().chain(PATHS);
     let paths = paths.map(|reference| Plan { reference, ..Plan::new() });
-    let frictions: [FrictionParams<f32>; 5] = [
-        CoulombParams::default().into(),
-        DahlParams::default().into(),
-        LugreParams::default().into(),
-        ElastoPlasticParams::default().into(),
-        MaxwellParams::default().into(),
-    ];
-    let frictions = frictions.map(|friction| around(PlantParams { friction, ..PlantParams::default() }));
+    let frictions =
+        FrictionParams::all().map(|friction| around(PlantParams { friction, ..PlantParams::default() }));
     let actuators: [ActuatorParams<f32>; 3] = [
         ActuatorParams::Geometry(BrakeGeometry {
             inner_radius: 0.05,
@@ -203,10 +196,25 @@ fn shown(setting: &Setting, value: u64) -> String {
     }
 }
 
+/// Units of the bounds that are intervals: both ends of one have that of its key.
+const OF_INTERVALS: &[(&str, &Unit)] = &[
+    ("bounds.inertia_kg_m2.", &KG_M2),
+    ("bounds.drive_torque_nm.", &NM),
+    ("bounds.viscous_damping_nm_s_rad.", &NM_S_RAD),
+    ("bounds.brake_gain_nm_v.", &NM_V),
+    ("bounds.motor_gain_nm_v.", &NM_V),
+];
+
+/// The unit of a setting's value.
+fn unit<'a>(setting: &Setting, row: &'a Row) -> &'a Unit {
+    let name = setting.name.to_string();
+    OF_INTERVALS.iter().find(|(interval, _)| name.starts_with(interval)).map_or(&row.unit, |(_, unit)| unit)
+}
+
 /// The range of a setting in words, unit included.
 fn range(setting: &Setting) -> String {
     match setting.declared {
-        Declared::Row(row, _) => row.range.words(row.kind, &row.unit, false).to_string(),
+        Declared::Row(row, _) => row.range.words(row.kind, unit(setting, row), false).to_string(),
         Declared::Choice(choice) => {
             let options: Vec<&str> = choice.options.iter().map(|option| option.key).collect();
             format!("one of: {}", options.join(", "))
@@ -244,8 +252,8 @@ fn is_refused(plan: &Plan, setting: &Setting, value: u64) -> Result<(), String> 
     }
     match declared {
         // A list's number of points has no unit.
-        Declared::Row(row, _) if row.kind != Kind::Points && !text.contains(row.unit.text) => {
-            Err(format!("{told}: {text}: without {}", row.unit.text))
+        Declared::Row(row, _) if row.kind != Kind::Points && !text.contains(unit(setting, row).text) => {
+            Err(format!("{told}: {text}: without {}", unit(setting, row).text))
         }
         _ => Ok(()),
     }

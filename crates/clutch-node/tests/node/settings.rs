@@ -5,7 +5,7 @@ use clutch_core::law::{
     CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
     SmcSignParams, SuperTwistingParams,
 };
-use clutch_core::params::Params;
+use clutch_core::params::{Choice, Params};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::{FNV_64, LimitParams, fnv1a_64};
 use clutch_core::{
@@ -236,15 +236,18 @@ fn a_number_that_a_constructor_refuses_is_told_with_key_value_and_expectation() 
             256 + 12,
             "268: the board lacks it, or knows no such value: expected a whole number from 1 to 16 bits",
         ),
-        (
-            "law",
-            11,
-            "11: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid, super_twisting, smc_integral, dob, glide, voltage, hold",
-        ),
-        ("bounds.brake_gain_nm_v.high", real(f32::INFINITY), "inf: expected a finite number"),
+        ("bounds.brake_gain_nm_v.high", real(f32::INFINITY), "inf: expected a finite number, N m/V"),
+        ("bounds.inertia_kg_m2.low", real(f32::NAN), "NaN: expected a finite number, kg m²"),
+        ("bounds.friction.low", real(f32::NAN), "NaN: expected a finite number"),
     ] {
         assert_eq!(refusal(&with(name, value)), format!("{name} = {text}"));
     }
+    let (laws, none) = (laws(), laws().len());
+    let text = format!(
+        "law = {none}: the board lacks it, or knows no such value: expected one of: {}",
+        laws.join(", ")
+    );
+    assert_eq!(refusal(&with("law", none as u64)), text);
     let pairs = Plan::new().pairs();
     assert_eq!(refusal(&sent(&pairs[1..])), "ticks: missing");
 }
@@ -279,14 +282,17 @@ fn settings_are_found_by_their_keys_in_the_order_of_the_declarations() {
     assert!(!sent.iter().any(|name| name.starts_with("law.smc")), "{sent:?}");
 }
 
+/// The names of the laws.
+fn laws() -> Vec<&'static str> {
+    <LawParams as Choice<f64>>::CHOICE.options.iter().map(|option| option.key).collect()
+}
+
 #[test]
 fn the_hash_is_that_of_names_types_and_units() {
     let text: String = Setting::all().map(|s| format!("{}:{}:{}\n", s.name, s.kind(), s.unit())).collect();
     assert_eq!(SETTINGS_HASH, fnv1a_64(FNV_64, text.as_bytes()), "{text}");
-    assert!(
-        text.contains("\nlaw:pd/ctc/smc/smc_sign/pid/super_twisting/smc_integral/dob/glide/voltage/hold:\nlaw.pd.kp_v_rad:f32:V/rad\n"),
-        "{text}"
-    );
+    let laws = format!("\nlaw:{}:\nlaw.pd.kp_v_rad:f32:V/rad\n", laws().join("/"));
+    assert!(text.contains(&laws), "{text}");
 }
 
 #[test]

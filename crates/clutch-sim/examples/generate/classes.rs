@@ -10,7 +10,7 @@ struct Known {
     table: &'static str,
     /// Name of the class, if it is another.
     name: &'static str,
-    /// `true` if methods are written by hand, as a class of that name in `_mixins.py`.
+    /// `true` if methods are written by hand, as a class of that name in `_mixins.py`; all frictions have those of one.
     mixin: bool,
     example: &'static str,
 }
@@ -43,42 +43,42 @@ reference.ramp"#,
     known(
         "StribeckParams",
         "StribeckFriction",
-        true,
+        false,
         r">>> clutch.StribeckFriction(mu_static=0.25)
 StribeckFriction(mu_static=0.25, mu_dynamic=0.15, stribeck_velocity_rad_s=0.001, stribeck_exponent=1.0)",
     ),
     known(
         "CoulombParams",
         "CoulombFriction",
-        true,
+        false,
         r">>> clutch.CoulombFriction(mu_static=0.3)
 CoulombFriction(mu_static=0.3, mu_dynamic=0.15)",
     ),
     known(
         "LugreParams",
         "LugreFriction",
-        true,
+        false,
         r">>> clutch.Rig(friction=clutch.LugreFriction()).friction.stiffness_1_rad
 2000.0",
     ),
     known(
         "DahlParams",
         "DahlFriction",
-        true,
+        false,
         r">>> clutch.DahlFriction()
 DahlFriction(mu_dynamic=0.15, stiffness_1_rad=2000.0)",
     ),
     known(
         "ElastoPlasticParams",
         "ElastoPlasticFriction",
-        true,
+        false,
         r">>> clutch.ElastoPlasticFriction(mu_elastic=0.1).mu_elastic
 0.1",
     ),
     known(
         "MaxwellParams",
         "MaxwellFriction",
-        true,
+        false,
         r"Three elements, none in the third place; the fourth bears what the others leave:
 
 >>> clutch.MaxwellFriction(share_a=0.5, share_b=0.3, share_c=0.0).attraction_1_s
@@ -334,8 +334,8 @@ Safety(reason='a weight drives the shaft', live_gains=False, on_fault=HoldVoltag
 pub(crate) struct Class<'a> {
     /// Its name.
     pub(crate) name: String,
-    /// `true` if it has methods that are written by hand.
-    pub(crate) mixin: bool,
+    /// The class in `_mixins.py` with the methods that are written by hand, if it has some.
+    pub(crate) mixin: Option<String>,
     /// An example for its documentation; empty if there is none.
     pub(crate) example: &'static str,
     /// The place at which a file has it; the first of several.
@@ -362,9 +362,10 @@ pub(crate) fn classes(places: &[Place]) -> Result<Vec<Class<'_>>, String> {
             }
         }
         let known = KNOWN.iter().find(|known| known.table == place.table.name);
+        let of_its_own = || known.is_some_and(|known| known.mixin).then(|| name.clone());
         all.push(Class {
+            mixin: if is_friction(place) { Some("Friction".to_owned()) } else { of_its_own() },
             name,
-            mixin: known.is_some_and(|known| known.mixin),
             example: known.map_or("", |known| known.example),
             place,
         });
@@ -390,8 +391,13 @@ pub(crate) fn name(place: &Place) -> String {
         (None, Some((_, option))) if place.table.name.is_empty() => {
             option.key.split('_').map(|word| word[..1].to_uppercase() + &word[1..]).collect()
         }
+        (None, _) if is_friction(place) => plain(place.table) + "Friction",
         (None, _) => plain(place.table),
     }
+}
+
+fn is_friction(place: &Place) -> bool {
+    place.option.is_some_and(|(choice, _)| choice.name == "FrictionParams")
 }
 
 fn plain(table: &TableInfo) -> String {

@@ -114,7 +114,7 @@ fn union_of(name: &str, of: &[&str]) -> String {
 
 fn class_of(class: &Class<'_>, classes: &[Class<'_>]) -> String {
     let place = class.place;
-    let base = if class.mixin { format!("_mixins.{}", class.name) } else { "_Params".to_owned() };
+    let base = class.mixin.as_ref().map_or("_Params".to_owned(), |mixin| format!("_mixins.{mixin}"));
     let mut text =
         format!("@dataclass(frozen=True, kw_only=True, repr=False)\nclass {}({base}):\n", class.name);
     let fields: Vec<Field> =

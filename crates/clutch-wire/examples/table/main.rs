@@ -1,11 +1,7 @@
-//! Prints the files made from the table of messages. They are committed; a test compares them with
-//! the present output.
+//! Prints what is made from the table of messages: the C header, test vectors, the tables of docs/wire.md. `cargo xtask
+//! generate` puts them into the tree; a test compares.
 //!
-//! ```sh
-//! cargo run -p clutch-wire --example table -- header > crates/clutch-wire/include/clutch_wire.h
-//! cargo run -p clutch-wire --example table -- vectors > tests/wire/vectors.csv
-//! cargo run -p clutch-wire --example table -- markdown docs/wire.md   # rewrites its tables
-//! ```
+//! `cargo run -p clutch-wire --example table -- header`
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a developer's tool, not the codec")]
 #![allow(clippy::std_instead_of_core, clippy::alloc_instead_of_core, reason = "it runs on the host")]
 
@@ -19,8 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ["header"] => print!("{}", header::text()),
         ["vectors"] => print!("{}", vectors::text()),
         ["markdown"] => print!("{}", markdown::tables()),
-        ["markdown", path] => std::fs::write(path, markdown::replaced(&std::fs::read_to_string(path)?)?)?,
-        _ => return Err("expected one of: header, vectors, markdown [FILE]".into()),
+        _ => return Err("expected one of: header, vectors, markdown".into()),
     }
     Ok(())
 }

@@ -5,9 +5,6 @@ use clutch_wire::{
 };
 use std::fmt::Write as _;
 
-const BEGIN: &str = "<!-- table:begin -->\n";
-const END: &str = "<!-- table:end -->";
-
 /// All tables, from the first line to the last.
 pub(crate) fn tables() -> String {
     let mut out = String::new();
@@ -58,11 +55,4 @@ fn write_all(out: &mut String) -> std::fmt::Result {
         }
     }
     Ok(())
-}
-
-/// The document with its tables as they are now.
-pub(crate) fn replaced(document: &str) -> Result<String, String> {
-    let parts = document.split_once(BEGIN).and_then(|(head, rest)| Some((head, rest.split_once(END)?.1)));
-    let (head, tail) = parts.ok_or_else(|| format!("expected a document with {BEGIN:?} and {END:?}"))?;
-    Ok(format!("{head}{BEGIN}\n{}\n{END}{tail}", tables()))
 }
