@@ -479,7 +479,8 @@ class BrakeGeometry(_mixins.BrakeGeometry):
         Armature resistance. Not printed in the paper. `R_a`: a finite number above 0 Ω.
     contact_radius_m : float
         Distance from the motor's shaft to the contact on the disc. `r_c`: a finite number above 0 m; a
-        distance with which K_COF of (18) is a finite number above 0 N m/V.
+        distance with which K_COF of (18), made of it and of inner_radius_m, torque_constant_nm_a,
+        pad_area_m2, lever_area_m2 and armature_resistance_ohm, is a finite number above 0 N m/V.
 
     Raises
     ------
@@ -521,7 +522,8 @@ class MotorActuator(_Params):
         Normal force, as torque per unit of μ. `N_0`: a finite number of at least 0 N m.
     load_share : float, default 0.0
         Share of the motor's torque that presses, too: friction that grows with the load, as a gear's. `λ`: a
-        finite number of at least 0; a share below 1/μ: at or above it the motor jams in its own friction.
+        finite number of at least 0; a share below 1/μ of rig.friction and model.friction: at or above it the
+        motor jams in its own friction.
 
     Raises
     ------
@@ -590,10 +592,10 @@ class StribeckFriction(_mixins.Friction):
     ----------
     mu_static : float, default 0.2
         Coefficient of friction at rest, in (2). `μ_s`: a finite number of at least 0; a number above 0 where
-        it is the model's: computed torque and bounds divide by it.
+        it is the model's (model.friction): computed torque and bounds divide by it.
     mu_dynamic : float, default 0.15
         Coefficient of friction of a fast shaft, in (2). `μ_d`: a finite number of at least 0; a number above
-        0 where it is the model's: computed torque and bounds divide by it.
+        0 where it is the model's (model.friction): computed torque and bounds divide by it.
     stribeck_velocity_rad_s : float, default 0.001
         Stribeck velocity in (2), at which all but 1/e of the drop from `μ_s` to `μ_d` is done. `θ̇_s`: a
         finite number above 0 rad/s whose inverse is finite, too.
@@ -632,7 +634,7 @@ class CoulombFriction(_mixins.Friction):
         mu_dynamic.
     mu_dynamic : float, default 0.15
         Coefficient of friction in motion. `μ_d`: a finite number of at least 0; a number above 0 where it is
-        the model's: computed torque and bounds divide by it.
+        the model's (model.friction): computed torque and bounds divide by it.
 
     Raises
     ------
@@ -816,7 +818,7 @@ class MaxwellFriction(_mixins.Friction):
         Share of the second element. `α_b`: a number from 0 to 1.
     share_c : float, default 0.25
         Share of the third element; the fourth bears what all others leave. `α_c`: a number from 0 to 1; a
-        share that leaves the sum of all shares at 1 or below.
+        share with which share_a, share_b, share_c and share_e to share_h are 1 or below in all.
     share_e : float, default 0.0
         Share of the fifth element. `α_e`: a number from 0 to 1.
     share_f : float, default 0.0
@@ -1224,7 +1226,8 @@ class Ripple(_Params):
     ----------
     rms : float
         Root mean square of the variation, as a share of the friction. A finite number of at least 0; a number
-        that, times the root of twice the number of waves, stays below 1.
+        that, times the root of twice the number of waves (from lowest_waves_per_turn to
+        highest_waves_per_turn), stays below 1.
     lowest_waves_per_turn : int
         Longest wave. A whole number from 1 to 4 294 967 295 waves per turn; a multiple of
         spacing_waves_per_turn.
@@ -1269,7 +1272,7 @@ class Runout(_Params):
     ----------
     amplitude : float
         Amplitude of the variation, as a share of the friction. `A`: a number of at least 0 and below 1; a
-        share that, with the largest sum of the ripple's waves, stays below 1.
+        share that, with the largest sum of the waves of rig.ripple, stays below 1.
     waves_per_turn : int, default 1
         Waves in a turn: 1 for a disc that is not square to its shaft, 2 for one that is bent like a saddle.
         `n`: a whole number from 1 to 1000 waves per turn.
@@ -1375,7 +1378,8 @@ class Model(_Params):
         Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
     drive_torque_nm : float, default 0.047088000000000005
         Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone. `T_u`: a finite number, N m; a
-        torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor.
+        torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor
+        (model.actuator): let the drive turn the shaft forwards, or take a motor.
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
@@ -1941,8 +1945,8 @@ class Observer(_Params):
     disturbance_walk_nm_rt_s : float, default 0.1
         Rate at which the disturbance torque wanders: by this much (standard deviation) in one second, and
         with the root of the time. Larger follows friction faster and lets more of the encoder's steps
-        through. `q_d`: a finite number above 0 N m/√s; a number in N m/√s for which stable gains exist in
-        this precision.
+        through. `q_d`: a finite number above 0 N m/√s; a number in N m/√s for which, with model.inertia_kg_m2
+        and sampling.period_us, stable gains exist in sampling.scalar.
 
     Raises
     ------
@@ -2091,11 +2095,11 @@ class Trapezoid(_Params):
         distance below 1e12 counts of rig.encoder.counts_per_rev, °.
     speed_deg_s : float
         Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
-        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to end within 1e15
-        periods, °/s.
+        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to be through with
+        distance_deg within 1e15 periods, °/s.
     acceleration_deg_s2 : float
-        Acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to end within
-        1e15 periods, °/s².
+        Acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to be through
+        with distance_deg within 1e15 periods, °/s².
 
     Raises
     ------
@@ -2127,13 +2131,14 @@ class JerkLimited(_Params):
         distance below 1e12 counts of rig.encoder.counts_per_rev, °.
     speed_deg_s : float
         Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
-        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to end within 1e15
-        periods, °/s.
+        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to be through with
+        distance_deg within 1e15 periods, °/s.
     acceleration_deg_s2 : float
-        Highest acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to
-        end within 1e15 periods, °/s².
+        Highest acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to be
+        through with distance_deg within 1e15 periods, °/s².
     jerk_deg_s3 : float
-        Highest jerk. A finite number above 0 °/s³; a jerk high enough to end within 1e15 periods, °/s³.
+        Highest jerk. A finite number above 0 °/s³; a jerk high enough to be through with distance_deg within
+        1e15 periods, °/s³.
 
     Raises
     ------
@@ -2495,8 +2500,8 @@ class HoldVoltage(_Params):
     ----------
     volts_v : float
         Voltage that stops and holds the shaft at the worst corner of the bounds. A finite number, V; a
-        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a brake above 0,
-        which holds with nothing else.
+        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0 with
+        a brake (rig.actuator), which holds with nothing else.
 
     Raises
     ------
@@ -2526,8 +2531,8 @@ class RampVoltage(_Params):
         that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us.
     volts_v : float
         Voltage at the end, which stops and holds the shaft at the worst corner of the bounds. A finite
-        number, V; a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a
-        brake above 0, which holds with nothing else.
+        number, V; a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage
+        above 0 with a brake (rig.actuator), which holds with nothing else.
 
     Raises
     ------
@@ -2569,8 +2574,8 @@ class HoldThenRelease(_Params):
     ----------
     volts_v : float
         Voltage that stops and holds the shaft at the worst corner of the bounds. A finite number, V; a
-        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a brake above 0,
-        which holds with nothing else.
+        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0 with
+        a brake (rig.actuator), which holds with nothing else.
     after_s : float
         Time of holding, after which it lets go. A finite number above 0 s; a time of 1 to 4e9 times
         sampling.period_us.

@@ -251,7 +251,7 @@ def test_a_release_test_comes_first_and_ends_what_is_wired_wrongly():
     assert "0 V for 12 periods, at most 0.27°" in result.announcement
     with pytest.raises(ValueError, match='release_test = "maybe": expected "auto" or "always" or "never"'):
         package.loop(release_test="maybe")
-    with pytest.raises(package.LoopError, match="way of the release test = 11°: expected above 0 and at most 10"):
+    with pytest.raises(package.LoopError, match="release_deg = 11: expected a number above 0 and at most 10 °"):
         package.loop(release_deg=11)
 
 

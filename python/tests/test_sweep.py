@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import clutch
-from clutch import _clutch, _sweep
+from clutch import _clutch, _sweep, _units
 
 FIGURES = [
     "measured_s",
@@ -553,3 +553,14 @@ def test_the_command_writes_the_same_table_as_parquet(clutch_with_parquet, tmp_p
             assert repr(its[field.name].to_pylist()) == repr(ours[field.name].to_pylist()), field
     assert [bool(text) for text in its["error"].to_pylist()] == [False, False, True, True, False, False]
     assert clutch.Scenario.from_toml(its.schema.metadata[b"scenario.toml"].decode()) == scenario
+
+
+def test_a_key_that_does_not_end_with_its_unit_has_it_in_parquet(clutch_with_parquet, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    axes = {"rig.encoder.counts_per_rev": "2000", "rig.dac.bits": "12", "safety.limits.lost": "8"}
+    file = tmp_path / "table.parquet"
+    over = [word for key, value in axes.items() for word in ("--over", f"{key}={value}")]
+    clutch_with_parquet("sweep", "board_smc_2", "--set", "run.duration_s=1.2", *over, "--out", file)
+    its = parquet.read_schema(file)
+    units = {key: its.field(key).metadata[b"units"].decode() for key in axes}
+    assert units == {key: _units.attributes(key)["units"] for key in axes}

@@ -1,6 +1,6 @@
 //! `clutch loop`.
 
-use crate::args::{ScenarioArgs, key_value};
+use crate::args::{ScenarioArgs, key_value, word};
 use crate::live::LiveArg;
 use crate::output::{
     BUILD, Exit, beside, coloured, folded, json, not_certified, paragraph, quiet, report, shown, warn,
@@ -14,7 +14,8 @@ use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
-use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
+use clutch_loop::realtime::{CycleSummary, RealtimeOptions, SPIN_US, Wait};
+use clutch_loop::release;
 use clutch_loop::session::{
     Announcement, Board, Event, Progress, Release, Session, SessionError, SessionOptions,
 };
@@ -27,45 +28,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum PaceArg {
-    /// The board's sample starts a cycle.
-    Sample,
-    /// This machine's clock starts a cycle.
-    Clock,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum OverrunsArg {
     /// Late answers are counted; many within a short time end control.
     Manage,
     /// The first late answer ends control.
     Fault,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnDriftArg {
-    /// It is reported and logged, and the run goes on.
-    Tell,
-    /// The run ends in the safe state.
-    Stop,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum ReleaseArg {
-    /// On a serial device, where the scenario allows it.
-    Auto,
-    /// In any case.
-    Always,
-    /// Never.
-    Never,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum WaitArg {
-    /// The kernel wakes the loop.
-    Sleep,
-    /// The loop wakes early and spins.
-    Spin,
 }
 
 /// Closes the loop on a board over a serial line, or on a simulated one.
@@ -122,10 +89,11 @@ pub(crate) struct Loop {
     certificate: Option<PathBuf>,
     /// Release test before the run: the brake lets go for some milliseconds and grips again; the way shows wrong signs and
     /// scales of encoder and converter.
-    #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]
-    release_test: ReleaseArg,
+    #[arg(long, value_name = "WHEN", default_value = Release::default().name(),
+        value_parser = word(Release::WORDS, Release::named))]
+    release_test: Release,
     /// The longest way in that test of any shaft within the bounds, °, up to 10: a longer one finds more.
-    #[arg(long, value_name = "DEG", default_value_t = 0.1)]
+    #[arg(long, value_name = "DEG", default_value_t = release::WAY_DEG)]
     release_deg: f64,
     /// Cycles per second instead of sampling.period_us, Hz.
     #[arg(long, alias = "update_rate", value_name = "HZ")]
@@ -144,16 +112,16 @@ pub(crate) struct Loop {
     #[arg(long, value_enum, default_value = "manage")]
     overruns: OverrunsArg,
     /// Effect of friction over load that leaves the bounds, by what counts and voltages show.
-    #[arg(long, value_enum, default_value = "tell")]
-    on_drift: OnDriftArg,
+    #[arg(long, default_value = OnDrift::default().name(), value_parser = word(OnDrift::WORDS, OnDrift::named))]
+    on_drift: OnDrift,
     /// Start of a cycle.
-    #[arg(long, value_enum, default_value = "sample")]
-    pace: PaceArg,
+    #[arg(long, default_value = Pace::default().name(), value_parser = word(Pace::WORDS, Pace::named))]
+    pace: Pace,
     /// Wait mode of the loop.
-    #[arg(long, value_enum, default_value = "sleep")]
-    wait: WaitArg,
+    #[arg(long, default_value = Wait::default().name(), value_parser = word(Wait::WORDS, Wait::named))]
+    wait: Wait,
     /// Time before a sample at which spinning begins, with --wait spin, µs.
-    #[arg(long, default_value_t = 150, value_name = "US")]
+    #[arg(long, default_value_t = SPIN_US, value_name = "US")]
     spin_us: u32,
     /// Injects a fault on the simulated board; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…", conflicts_with = "port")]
@@ -291,29 +259,16 @@ impl Loop {
             log: self.log.clone(),
             uncertified: self.uncertified,
             certificate: self.certificate.clone(),
-            release: match self.release_test {
-                ReleaseArg::Auto => Release::Auto,
-                ReleaseArg::Always => Release::Always,
-                ReleaseArg::Never => Release::Never,
-            },
+            release: self.release_test,
             release_way: self.release_deg.to_radians(),
             realtime: RealtimeOptions {
                 thread_priority: self.thread_priority,
                 lock_memory: self.lock_memory,
                 cpu_affinity: self.cpu_affinity,
-                wait: match self.wait {
-                    WaitArg::Sleep => WaitMode::Sleep,
-                    WaitArg::Spin => WaitMode::SleepSpin { spin_us: self.spin_us },
-                },
+                wait: self.wait.mode(self.spin_us),
             },
-            pace: match self.pace {
-                PaceArg::Sample => Pace::Sample,
-                PaceArg::Clock => Pace::Clock,
-            },
-            on_drift: match self.on_drift {
-                OnDriftArg::Tell => OnDrift::Tell,
-                OnDriftArg::Stop => OnDrift::Stop,
-            },
+            pace: self.pace,
+            on_drift: self.on_drift,
             version: BUILD.to_owned(),
         }
     }

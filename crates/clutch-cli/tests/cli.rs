@@ -353,6 +353,21 @@ fn verdicts_have_colours_on_a_terminal_alone() {
 }
 
 #[test]
+fn a_simulated_board_that_cannot_begin_says_why() {
+    for (command, why) in [
+        (
+            "loop board_smc_2 --fault dac-stuck:at=0,volts=99",
+            "fault dac-stuck = 99: expected a voltage that the scenario's converter has, V",
+        ),
+        ("loop motor_pid --uncertified --fault contact:at=0,factor=0.5", "expected a brake that lets go at 0 V"),
+    ] {
+        let words: Vec<&str> = command.split(' ').collect();
+        let o = Command::new(env!("CARGO_BIN_EXE_clutch")).args(&words).output().expect("the command starts");
+        assert!(!o.status.success() && err(&o).contains(why), "{command}: {}", err(&o));
+    }
+}
+
+#[test]
 fn errors_fit_a_terminal_and_are_for_a_program_as_they_were() {
     let dir = folder("terminal");
     std::fs::write(dir.join("mine.toml"), format!("name = \"{}\" x\n", "long ".repeat(30))).unwrap();

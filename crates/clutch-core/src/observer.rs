@@ -41,7 +41,7 @@ crate::params! {
     }
     relations(p) {
         /// Gains come out.
-        STABLE: disturbance_walk, "a number in N m/√s for which stable gains exist in this precision";
+        STABLE: disturbance_walk, "a number in N m/√s for which, with model.inertia_kg_m2 and sampling.period_us, stable gains exist in sampling.scalar";
     }
 }
 
@@ -58,7 +58,7 @@ crate::params! {
     }
     relations(p) {
         /// The error dies away.
-        STABLE: disturbance, "three gains with which the error dies away: smaller ones, N m/rad";
+        STABLE: disturbance, "a gain with which, and with position and velocity_1_s, the error dies away: a smaller one, N m/rad";
     }
 }
 

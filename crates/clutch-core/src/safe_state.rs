@@ -29,7 +29,7 @@ crate::params! {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "with a brake above 0, which holds with nothing else";
+        PRESSES: volts, "a voltage above 0 with a brake (rig.actuator), which holds with nothing else";
     }
 }
 
@@ -47,7 +47,7 @@ crate::params! {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "with a brake above 0, which holds with nothing else";
+        PRESSES: volts, "a voltage above 0 with a brake (rig.actuator), which holds with nothing else";
     }
 }
 
@@ -63,7 +63,7 @@ crate::params! {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "with a brake above 0, which holds with nothing else";
+        PRESSES: volts, "a voltage above 0 with a brake (rig.actuator), which holds with nothing else";
         /// The time is a number of periods.
         COUNTED: after, "a time of 1 to 4e9 times sampling.period_us";
     }

@@ -36,24 +36,24 @@ use rustix::fd::AsFd;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// The event that starts a cycle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
-    /// The board's sample: one clock, the board's.
-    #[default]
-    Sample,
-    /// The machine's clock: two clocks, so that now and then a cycle finds no sample or two.
-    Clock,
+clutch_core::words! {
+    /// The event that starts a cycle.
+    pub enum Pace {
+        /// The board's sample: one clock, the board's.
+        Sample = "sample" default,
+        /// The machine's clock: two clocks, so that now and then a cycle finds no sample or two.
+        Clock = "clock",
+    }
 }
 
-/// The effect of a drift out of the bounds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OnDrift {
-    /// It is reported and logged, and the run goes on.
-    #[default]
-    Tell,
-    /// It ends the run in the safe state, as an operator would.
-    Stop,
+clutch_core::words! {
+    /// The effect of a drift out of the bounds.
+    pub enum OnDrift {
+        /// It is reported and logged, and the run goes on.
+        Tell = "tell" default,
+        /// It ends the run in the safe state, as an operator would.
+        Stop = "stop",
+    }
 }
 
 /// Options of the loop.

@@ -15,10 +15,10 @@ use clutch_node::ControllerNode;
 use clutch_sim::scenario::{Plan, Table, Value};
 use clutch_sim::{Scenario, ScenarioError, Start};
 
-/// The longest way that a shaft of the bounds may make unless another is given, rad: 0.1°.
-pub const WAY: f64 = 0.1 * std::f64::consts::PI / 180.0;
-/// The longest that may be given, rad: 10°.
-pub const LONGEST_WAY: f64 = 100.0 * WAY;
+/// The longest way that a shaft of the bounds may make unless another is given, °.
+pub const WAY_DEG: f64 = 0.1;
+/// The longest that may be given, °.
+pub const LONGEST_WAY_DEG: f64 = 10.0;
 /// Periods that are watched once the slowest brake has stopped the shaft.
 const WATCHED: f64 = 3.0;
 /// Voltage at the rate of the law's way back, V/s: within a period.
@@ -287,7 +287,7 @@ mod tests {
 
     fn test_of(set: &[(&str, &str)]) -> Result<ReleaseTest, NoRelease> {
         let scenario = scenario(set);
-        ReleaseTest::new(&scenario, &scenario.plan().unwrap(), WAY).unwrap()
+        ReleaseTest::new(&scenario, &scenario.plan().unwrap(), WAY_DEG.to_radians()).unwrap()
     }
 
     const WIDE: [(&str, &str); 4] = [
@@ -302,7 +302,9 @@ mod tests {
         for set in [&WIDE[3..], &WIDE[..]] {
             let test = test_of(set).unwrap();
             let bounds = test.scenario.supervised_bounds(&test.scenario.plan().unwrap().bounds).unwrap();
-            assert!(test.longest_way <= WAY && test.longest_way > 0.5 * WAY);
+            assert!(
+                test.longest_way <= WAY_DEG.to_radians() && test.longest_way > 0.5 * WAY_DEG.to_radians()
+            );
             let mut longest: f64 = 0.0;
             for corner in corners(&bounds) {
                 let rig = corner.rig(&test.scenario).unwrap();
@@ -356,7 +358,7 @@ mod tests {
             .replace("[safety.on_fault.hold]\nvolts_v = 4.5", "[safety.on_fault.release]");
         let lets_go = Scenario::parse("lets go", &toml, &[]).unwrap();
         assert_eq!(
-            ReleaseTest::new(&lets_go, &lets_go.plan().unwrap(), WAY).unwrap().unwrap_err(),
+            ReleaseTest::new(&lets_go, &lets_go.plan().unwrap(), WAY_DEG.to_radians()).unwrap().unwrap_err(),
             NoRelease::NoGrip
         );
         let slow = [("sampling.period_us", "10000"), ("safety.limits.delay_cycles", "0")];

@@ -70,16 +70,16 @@ pub enum Board {
     Controller(Address),
 }
 
-/// Says if a release test comes before the run: see [`crate::release`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Release {
-    /// On a serial device, where the scenario allows one; a simulated board is wired as it says.
-    #[default]
-    Auto,
-    /// In any case; a scenario that allows none is refused.
-    Always,
-    /// Never.
-    Never,
+clutch_core::words! {
+    /// Says if a release test comes before the run: see [`crate::release`].
+    pub enum Release {
+        /// On a serial device, where the scenario allows one; a simulated board is wired as it says.
+        Auto = "auto" default,
+        /// In any case; a scenario that allows none is refused.
+        Always = "always",
+        /// Never.
+        Never = "never",
+    }
 }
 
 /// Options of a session.
@@ -123,7 +123,7 @@ impl Default for SessionOptions {
             uncertified: false,
             certificate: None,
             release: Release::default(),
-            release_way: release::WAY,
+            release_way: release::WAY_DEG.to_radians(),
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
             on_drift: OnDrift::default(),
@@ -145,7 +145,7 @@ pub enum SessionError {
     #[error(transparent)]
     Clearance(#[from] ClearanceError),
     /// The way of the release test.
-    #[error("way of the release test = {}°: expected above 0 and at most {}", number(.0.to_degrees()), number(release::LONGEST_WAY.to_degrees()))]
+    #[error("release_deg = {}: expected a number above 0 and at most {} °", number(.0.to_degrees()), release::LONGEST_WAY_DEG)]
     ReleaseWay(f64),
     /// The power of a release test to find faults could not be calculated.
     #[error(transparent)]
@@ -267,7 +267,7 @@ impl Session {
         let scenario = single.unwrap_or(scenario);
         let (certificate, log) = (options.certificate.as_deref(), options.log.as_deref());
         let cleared = check(&scenario, certificate, options.uncertified, log)?;
-        if !(options.release_way > 0.0 && options.release_way <= release::LONGEST_WAY) {
+        if !(options.release_way > 0.0 && options.release_way <= release::LONGEST_WAY_DEG.to_radians()) {
             return Err(SessionError::ReleaseWay(options.release_way));
         }
         let release = ReleaseTest::new(&scenario, &cleared.plan, options.release_way)?;
@@ -344,7 +344,11 @@ impl Session {
             (_, ScalarKind::F32) => course.on_daq::<f32>(),
             (_, ScalarKind::F64) => course.on_daq::<f64>(),
         };
-        let board = simulated.map(SimulatedBoard::stop).transpose();
+        let board = match simulated.map(SimulatedBoard::stop).transpose() {
+            // Of a board that could not begin the loop knows only that it has gone.
+            Err(why @ SessionError::Serve(ServeError::Board(_))) => return Err(why),
+            ended => ended,
+        };
         let (report, log) = ran?;
         Ok(Summary {
             scenario: self.scenario.name().to_owned(),

@@ -57,6 +57,12 @@ mod _clutch {
     /// Priority of the loop's control thread unless another is given.
     #[pymodule_export]
     const DEFAULT_PRIORITY: u8 = super::session::DEFAULT_PRIORITY;
+    /// Longest way of a shaft in the release test unless another is given, °.
+    #[pymodule_export]
+    const RELEASE_DEG: f64 = super::session::RELEASE_DEG;
+    /// Time before a sample at which spinning begins unless another is given, µs.
+    #[pymodule_export]
+    const SPIN_US: u32 = super::session::SPIN_US;
     /// Version of the package.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

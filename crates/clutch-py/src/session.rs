@@ -3,6 +3,7 @@
 use crate::convert::{core_error, from_json, log_error, loop_error};
 use crate::scenario::Scenario;
 use crate::stepping::native;
+use clutch_core::params::Word;
 use clutch_live::Live;
 use clutch_loop::build_error::BuildError;
 use clutch_loop::clearance::ClearanceError;
@@ -11,7 +12,7 @@ use clutch_loop::faults::Fault;
 use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
 use clutch_loop::preflight::PreflightError;
-use clutch_loop::realtime::{RealtimeOptions, WaitMode};
+use clutch_loop::realtime::{RealtimeOptions, Wait};
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -19,20 +20,20 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Priority of the control thread unless another is given.
-pub(crate) use clutch_loop::realtime::DEFAULT_PRIORITY;
+/// Values of `clutch.loop` unless others are given.
+pub(crate) use clutch_loop::realtime::{DEFAULT_PRIORITY, SPIN_US};
+pub(crate) use clutch_loop::release::WAY_DEG as RELEASE_DEG;
 
 fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> PyResult<T> {
     text.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
 }
 
 /// One of some words.
-fn chosen<T, const N: usize>(name: &str, word: &str, choices: [(&str, T); N]) -> PyResult<T> {
-    let expected = choices.each_ref().map(|(w, _)| format!("{w:?}")).join(" or ");
-    let found = choices.into_iter().find(|(w, _)| *w == word);
-    found
-        .map(|(_, choice)| choice)
-        .ok_or_else(|| PyValueError::new_err(format!("{name} = {word:?}: expected {expected}")))
+fn chosen<T>(name: &str, word: &str, named: fn(&str) -> Option<T>, words: &[Word]) -> PyResult<T> {
+    named(word).ok_or_else(|| {
+        let expected: Vec<String> = words.iter().map(|word| format!("{:?}", word.name)).collect();
+        PyValueError::new_err(format!("{name} = {word:?}: expected {}", expected.join(" or ")))
+    })
 }
 
 fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
@@ -114,24 +115,16 @@ pub(crate) fn run_loop<'py>(
         patient,
         uncertified,
         certificate,
-        release: chosen(
-            "release_test",
-            release_test,
-            [("auto", Release::Auto), ("always", Release::Always), ("never", Release::Never)],
-        )?,
+        release: chosen("release_test", release_test, Release::named, Release::WORDS)?,
         release_way: release_deg.to_radians(),
         realtime: RealtimeOptions {
             thread_priority,
             lock_memory,
             cpu_affinity,
-            wait: chosen(
-                "wait",
-                wait,
-                [("sleep", WaitMode::Sleep), ("spin", WaitMode::SleepSpin { spin_us })],
-            )?,
+            wait: chosen("wait", wait, Wait::named, Wait::WORDS)?.mode(spin_us),
         },
-        on_drift: chosen("on_drift", on_drift, [("tell", OnDrift::Tell), ("stop", OnDrift::Stop)])?,
-        pace: chosen("pace", pace, [("sample", Pace::Sample), ("clock", Pace::Clock)])?,
+        on_drift: chosen("on_drift", on_drift, OnDrift::named, OnDrift::WORDS)?,
+        pace: chosen("pace", pace, Pace::named, Pace::WORDS)?,
         version: clutch_cli::BUILD.to_owned(),
     };
     let session = Session::new((*scenario.0).clone(), options).map_err(|e| error(py, &scenario, &e))?;

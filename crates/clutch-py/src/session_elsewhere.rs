@@ -6,6 +6,9 @@ use pyo3::types::{PyDict, PyTuple};
 
 /// The priority that a control thread has here: none of its own.
 pub(crate) const DEFAULT_PRIORITY: u8 = 0;
+/// Nothing is tested, and nothing waits.
+pub(crate) const RELEASE_DEG: f64 = 0.0;
+pub(crate) const SPIN_US: u32 = 0;
 
 /// Refuses: ports and real time are those of Linux.
 #[pyfunction]

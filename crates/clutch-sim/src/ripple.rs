@@ -33,7 +33,7 @@ params! {
                 && (p.highest - p.lowest) / p.spacing < 64
                 && p.highest / p.spacing <= 1000;
         /// Friction does not reach 0.
-        POSITIVE: rms, "a number that, times the root of twice the number of waves, stays below 1" =>
+        POSITIVE: rms, "a number that, times the root of twice the number of waves (from lowest_waves_per_turn to highest_waves_per_turn), stays below 1" =>
             p.amplitude() * f64::from(p.waves()) < 1.0;
     }
 }
@@ -62,7 +62,7 @@ params! {
     }
     relations(p) {
         /// Friction does not reach 0.
-        POSITIVE: amplitude, "a share that, with the largest sum of the ripple's waves, stays below 1";
+        POSITIVE: amplitude, "a share that, with the largest sum of the waves of rig.ripple, stays below 1";
     }
 }
 

@@ -144,7 +144,7 @@ impl<'a> RunSpec<'a> {
         match (self.run.engine, bends) {
             (EngineKind::Auto | EngineKind::Bristle, true) => return Ok(EngineKind::Bristle),
             (EngineKind::Bristle, false) => return Err(RunError::NoBristles),
-            (EngineKind::DormandPrince | EngineKind::ExactFlow, true) => return Err(RunError::Bristles),
+            (engine, true) => return Err(RunError::Bristles(engine)),
             _ => {}
         }
         match (self.run.engine, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
@@ -221,13 +221,15 @@ pub enum RunError {
     #[error("the servo has another period or another encoder than the run")]
     OtherServo,
     /// The engine cannot take the rig.
-    #[error("engine = exact_flow needs {0}; use engine = dormand_prince or auto")]
+    #[error("engine = exact_flow: expected dormand_prince or auto: exact_flow needs {0}")]
     Engine(&'static str),
     /// The friction has bristles, which the engine has not.
-    #[error("the rig's friction has bristles, which bend before it slides: use engine = bristle or auto")]
-    Bristles,
+    #[error("engine = {}: expected bristle or auto: the rig's friction has bristles, which bend before it slides", .0.name())]
+    Bristles(EngineKind),
     /// The friction has no bristles, which the engine needs.
-    #[error("engine = bristle is for friction with bristles, and the rig's has none: use engine = auto")]
+    #[error(
+        "engine = bristle: expected dormand_prince, exact_flow or auto: the rig's friction has no bristles"
+    )]
     NoBristles,
     /// The engine gave up.
     #[error(transparent)]

@@ -2,7 +2,9 @@
 //! row of a sweep. A parameter that is refused is named with its key, its value and what is expected, unit included;
 //! one that is taken arrives in the parameters as it was given.
 
-use clutch_core::params::{Choice, Conversion, Editor, Info, Kind, Params, Range, Row, Table as Parameters};
+use clutch_core::params::{
+    Choice, Conversion, Editor, Info, Kind, Params, Range, Row, Table as Parameters, TableInfo,
+};
 use clutch_sim::scenario::ScenarioParams;
 use clutch_sim::scenario::describe::{Entry, entries, row_is_required, table_is_required};
 use clutch_sim::sweep::Sweep;
@@ -456,4 +458,54 @@ fn a_table_in_two_places_is_named_by_its_own() {
     assert_eq!((error.key.as_str(), error.value.as_str()), ("model.friction.stribeck.mu_static", "0"));
     let set = [("rig.friction.stribeck.mu_static".to_owned(), "0".to_owned())];
     Scenario::parse("two", &place.base.to_string(), &set).unwrap();
+}
+
+/// What relates keys names another one; these relate the value to no other.
+const BY_ITSELF: &[&str] = &[
+    "at least one point",
+    "times of at least 0 s that rise from point to point",
+    "a list of 4 to 100 000 points",
+    "the rig and the ride that it is of, as \"disc 7, 2 °/s\"",
+    "factors of 0.1 to 10",
+    "an angle less than 1 ° from the one before: the ripple of a disc has waves of about 1 °",
+    "why this safe state is right for this rig, as \"a weight drives the shaft\"",
+];
+
+fn relations_of(info: &'static Info, found: &mut Vec<(&'static str, &'static str)>) {
+    let mut table = |table: &'static TableInfo| {
+        found.extend(table.relations.iter().map(|relation| (table.name, relation.expected)));
+        for nested in table.nested {
+            relations_of(nested.info, found);
+        }
+    };
+    match info {
+        Info::Table(info) => table(info),
+        Info::Choice(choice) => choice.options.iter().for_each(|option| table(option.table)),
+    }
+}
+
+#[test]
+fn what_relates_two_parameters_names_the_other() {
+    let mut keys = Vec::new();
+    keys_of(&<ScenarioParams as Params<f64>>::INFO, "", &mut keys);
+    let mut relations = Vec::new();
+    relations_of(&<ScenarioParams as Params<f64>>::INFO, &mut relations);
+    assert!(relations.len() > 40, "{}", relations.len());
+    let is_key = |word: &str| {
+        let ends = |key: &str| key == word || key.ends_with(&format!(".{word}"));
+        // Of a table, too: `rig.friction`.
+        let begins = |key: &str| key.contains(&format!("{word}.")) && word.contains('.');
+        keys.iter().any(|(key, _)| ends(key) || begins(key))
+    };
+    let names_none = |expected: &str| {
+        let mut words = expected
+            .split(|c: char| !(c.is_alphanumeric() || "._".contains(c)))
+            .map(|word| word.trim_matches('.'));
+        !words.any(|word| (word.contains('_') || word.contains('.')) && is_key(word))
+    };
+    let wrong: Vec<_> = relations
+        .into_iter()
+        .filter(|(_, expected)| names_none(expected) && !BY_ITSELF.contains(expected))
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -5,7 +5,7 @@ use crate::columnar::{Column, Columnar, TOGETHER, field};
 use crate::output::BUILD;
 use anyhow::{Context, anyhow};
 use arrow_schema::{DataType, Field};
-use clutch_core::params::Unit;
+use clutch_sim::Scenario;
 use clutch_sim::metrics::{Detected, Metrics};
 use clutch_sim::scenario::Value;
 use std::path::Path;
@@ -84,12 +84,11 @@ impl Cells {
 
 impl Grid {
     /// The columns in the order of [`Grid::header`].
-    fn columns(&self) -> Vec<(Field, Cells)> {
+    fn columns(&self, scenario: &Scenario) -> Vec<(Field, Cells)> {
         let mut columns: Vec<(Field, Cells)> = Vec::new();
         let mut add = |name: &str, cells: Cells, about| columns.push((cells.field(name, about), cells));
         for axis in &self.axes {
-            let unit = Unit::of_key(&axis.key).map_or("", |unit| unit.text);
-            add(&axis.key, Cells::of(axis), (unit, ""));
+            add(&axis.key, Cells::of(axis), (scenario.unit(&axis.key).unwrap_or_default(), ""));
         }
         let of_motion = Metrics::FIGURES.iter().map(|f| (f.name, (f.unit, f.label)));
         let about: Vec<_> =
@@ -105,10 +104,10 @@ impl Grid {
     }
 
     /// Makes the Parquet of the CSV; the file has its name only once it is whole.
-    pub(super) fn convert(&self, lines: &Path, out: &Path) -> anyhow::Result<()> {
+    pub(super) fn convert(&self, scenario: &Scenario, lines: &Path, out: &Path) -> anyhow::Result<()> {
         let part = out.with_extension("parquet.part");
         drop(std::fs::remove_file(&part)); // of a conversion that was cut off
-        let (fields, mut cells): (Vec<_>, Vec<_>) = self.columns().into_iter().unzip();
+        let (fields, mut cells): (Vec<_>, Vec<_>) = self.columns(scenario).into_iter().unzip();
         let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
         let kept = [
             ("scenario", self.origin.clone()),

@@ -244,7 +244,7 @@ impl SweepVerb {
         let made = if done { &self.out } else { &out };
         #[cfg(feature = "parquet")]
         if done && out != self.out {
-            grid.convert(&out, &self.out)?;
+            grid.convert(&scenario, &out, &self.out)?;
             drop(std::fs::remove_file(&out)); // every row of it is in the other
         }
         let mut text = format!("{rows} of {} rows in {}", grid.rows, made.display());

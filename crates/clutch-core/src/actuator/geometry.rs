@@ -26,7 +26,7 @@ crate::params! {
     }
     relations(p) {
         /// The gain is a number.
-        GAIN: contact_radius, "a distance with which K_COF of (18) is a finite number above 0 N m/V";
+        GAIN: contact_radius, "a distance with which K_COF of (18), made of it and of inner_radius_m, torque_constant_nm_a, pad_area_m2, lever_area_m2 and armature_resistance_ohm, is a finite number above 0 N m/V";
     }
 }
 

@@ -46,7 +46,7 @@ crate::params! {
     }
     relations(p) {
         /// More voltage gives more torque.
-        DRIVES_ITSELF: load_share, "a share below 1/μ: at or above it the motor jams in its own friction";
+        DRIVES_ITSELF: load_share, "a share below 1/μ of rig.friction and model.friction: at or above it the motor jams in its own friction";
     }
 }
 

@@ -68,7 +68,7 @@ crate::params! {
     }
     relations(p) {
         /// Elements share one friction.
-        WHOLE: share_c, "a share that leaves the sum of all shares at 1 or below" => // Decimal fractions round.
+        WHOLE: share_c, "a share with which share_a, share_b, share_c and share_e to share_h are 1 or below in all" => // Decimal fractions round.
             p.share_a + p.share_b + p.share_c + (p.share_e + p.share_f + p.share_g + p.share_h) <= T::from_f64(1.0 + 1e-6);
     }
 }

@@ -219,7 +219,8 @@ macro_rules! words {
         impl $name {
             /// Every word, in order.
             pub const ALL: &'static [$name] = &[$($name::$word),+];
-            const WORDS: &'static [$crate::params::Word] = &[$($crate::params::Word {
+            /// Every word with its meaning, in order.
+            pub const WORDS: &'static [$crate::params::Word] = &[$($crate::params::Word {
                 name: $text,
                 doc: $crate::__text!($($word_doc)+),
             }),+];

@@ -20,9 +20,9 @@ crate::params! {
         /// Counts hold the speed.
         SPEED: speed, "a finite speed below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
         /// The speed ends the path.
-        SPEED_ENDS: speed, "a speed high enough to end within 1e15 periods, °/s";
+        SPEED_ENDS: speed, "a speed high enough to be through with distance_deg within 1e15 periods, °/s";
         /// The acceleration ends the path.
-        ACCELERATION_ENDS: acceleration, "an acceleration high enough to end within 1e15 periods, °/s²";
+        ACCELERATION_ENDS: acceleration, "an acceleration high enough to be through with distance_deg within 1e15 periods, °/s²";
     }
 }
 
@@ -44,11 +44,11 @@ crate::params! {
         /// Counts hold the speed.
         SPEED: speed, "a finite speed below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
         /// The speed ends the path.
-        SPEED_ENDS: speed, "a speed high enough to end within 1e15 periods, °/s";
+        SPEED_ENDS: speed, "a speed high enough to be through with distance_deg within 1e15 periods, °/s";
         /// The acceleration ends the path.
-        ACCELERATION_ENDS: acceleration, "an acceleration high enough to end within 1e15 periods, °/s²";
+        ACCELERATION_ENDS: acceleration, "an acceleration high enough to be through with distance_deg within 1e15 periods, °/s²";
         /// The jerk ends the path.
-        JERK_ENDS: jerk, "a jerk high enough to end within 1e15 periods, °/s³";
+        JERK_ENDS: jerk, "a jerk high enough to be through with distance_deg within 1e15 periods, °/s³";
     }
 }
 

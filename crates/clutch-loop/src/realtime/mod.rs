@@ -44,6 +44,30 @@ pub const DEFAULT_PRIORITY: u8 = 49;
 /// that of a Rust thread is 2 MiB.
 pub const PREFAULTED_STACK: usize = 128 * 1024;
 
+/// Time before the deadline at which spinning begins unless another is given, µs.
+pub const SPIN_US: u32 = 150;
+
+clutch_core::words! {
+    /// The way in which a thread waits, by its name.
+    pub enum Wait {
+        /// The kernel wakes the loop.
+        Sleep = "sleep" default,
+        /// The loop wakes early and spins.
+        Spin = "spin",
+    }
+}
+
+impl Wait {
+    /// The mode, with the time before the deadline at which spinning begins, µs.
+    #[must_use]
+    pub const fn mode(self, spin_us: u32) -> WaitMode {
+        match self {
+            Wait::Sleep => WaitMode::Sleep,
+            Wait::Spin => WaitMode::SleepSpin { spin_us },
+        }
+    }
+}
+
 /// The way in which a thread waits for its deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WaitMode {

@@ -236,6 +236,12 @@ impl Scenario {
         self.row(key).map(describe::meaning)
     }
 
+    /// The unit of a parameter's value in a file; none of a key that is no parameter of the scenario.
+    #[must_use]
+    pub fn unit(&self, key: &str) -> Option<&'static str> {
+        self.row(key).map(|row| row.unit.text)
+    }
+
     /// The declaration of a parameter.
     pub(crate) fn row(&self, key: &str) -> Option<&'static Row> {
         row_at(&self.params, key)
@@ -362,7 +368,7 @@ impl Scenario {
         }
         spec.run.check(spec.period).map_err(|e| self.at("run", &e))?;
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| self.at("rig", &e))?;
-        spec.engine(&rig).map_err(|e| self.message("run.engine", e.to_string()))?;
+        spec.engine(&rig).map_err(|e| self.run_error(&e))?;
         self.path().map_err(|e| self.at("reference", &e))?;
         if self.scalar() == ScalarKind::F32 {
             // A number in range in f64 can be nothing, or beyond everything, in f32.
@@ -718,8 +724,11 @@ impl Scenario {
     pub fn run_error(&self, e: &RunError) -> ScenarioError {
         match e {
             RunError::Param(e) => self.at("", e),
-            RunError::Engine(_) | RunError::Bristles | RunError::NoBristles => {
-                self.message("run.engine", e.to_string())
+            RunError::Engine(_) | RunError::Bristles(_) | RunError::NoBristles => {
+                let (text, value) = (e.to_string(), self.params.run.engine.name());
+                let told = format!("engine = {value}: ");
+                let message = text.strip_prefix(&told).unwrap_or(&text).to_owned();
+                ScenarioError::new(&self.origin, "run.engine", &format!("{value:?}"), message)
             }
             RunError::Motion(_) => self.message("rig", e.to_string()),
             RunError::Begin(_) => self.path_message(e.to_string()),
