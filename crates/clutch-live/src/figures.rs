@@ -248,7 +248,7 @@ impl Figures {
             (true, _) => ("answers", &self.answers),
             (false, true) => ("wake-ups", &self.wake_ups),
             (false, false) => {
-                frame.render_widget("latency: not told", area);
+                frame.render_widget("latency: not measured", area);
                 return;
             }
         };
