@@ -205,7 +205,7 @@ impl Feed {
 
     /// The frame since the last one; none if nothing has come.
     fn frame(&mut self) -> Option<Frame> {
-        // A change of state is told also where no sample follows it.
+        // A change of state is reported also where no sample follows it.
         if self.all.time_s.is_empty() && self.all.state == self.told {
             return None;
         }

@@ -29,7 +29,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let actuator = Actuator::new(&scenario.spec().model.actuator).ok();
     let gain = actuator.map_or(0.0, |a| a.motor_gain());
     let preload = actuator.map(|a| a.preload()).filter(|n| *n > 0.0).unwrap_or(PRELOAD_NM);
-    // What a load takes one way it gives the other.
+    // A load gives one way the torque that it takes the other.
     let mean = |of: [Estimate; 2]| {
         let [value, low, high] = [|e: Estimate| e.value, |e: Estimate| e.low, |e: Estimate| e.high]
             .map(|get| 0.5 * (get(of[0]) + get(of[1])));
