@@ -114,7 +114,7 @@ def row(name: str, without: list[float], with_view: list[float]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="What the live view costs the loop")
+    parser = argparse.ArgumentParser(description="Cost of the live view to the loop")
     parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=5.0, help="of each run")
     parser.add_argument("--priority", type=int, default=49, help="of the control thread")

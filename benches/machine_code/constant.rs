@@ -33,7 +33,7 @@ pub(super) fn resolve(all: &mut [Instruction], word: impl Fn(u32) -> Option<u32>
         for n in to.into_iter().flatten().filter_map(|t| at.get(&t).copied()) {
             let met = match &before[n] {
                 None => known.clone(),
-                // What holds on every way to it.
+                // Facts that hold on every way to it.
                 Some(old) => old
                     .iter()
                     .filter(|(r, v)| known.get(*r) == Some(v))
@@ -73,7 +73,7 @@ fn is_call(i: &Instruction) -> bool {
     i.name == "blx" && i.flow == Flow::Indirect
 }
 
-/// What is known after an instruction. Each register that it names may be changed, if it is not one of those that
+/// Facts known after an instruction. Each register that it names may be changed, if it is not one of those that
 /// change none.
 fn after(i: &Instruction, mut known: Known, word: &impl Fn(u32) -> Option<u32>) -> Known {
     let value = match (i.name.as_str(), i.operands.as_slice()) {

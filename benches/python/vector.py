@@ -57,7 +57,7 @@ def step(name: str, shafts: int, repeats: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="What a step of many environments costs")
+    parser = argparse.ArgumentParser(description="Cost of a step of many environments")
     parser.add_argument("--repeats", type=int, default=5)
     repeats = parser.parse_args().repeats
     print("| scenario | shafts | a step, µs | of it rig and law | the same by a sweep |")

@@ -1,4 +1,4 @@
-//! Tells the build's version: the package's, and the commit where there is one.
+//! Gives the build its version: the package's, and the commit where there is one.
 
 use std::process::Command;
 

@@ -266,7 +266,7 @@ class Certificate(_Record):
         Parameters
         ----------
         not_covered : str or None
-            What of the scenario these verdicts do not cover; None if they cover it.
+            The part of the scenario that these verdicts do not cover; None if they cover it.
         scope : str or None
             The loop and the plants that they speak of.
         any_law : bool

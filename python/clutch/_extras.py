@@ -34,7 +34,7 @@ def needed(module: str, by: str) -> Iterator[None]:
     module
         Name of the module.
     by
-        What needs it, as a user calls it.
+        The function that needs it, as a user calls it.
 
     Raises
     ------

@@ -276,12 +276,12 @@ class Candidate:
     runs, runs_with_sticks : int
         Runs behind these figures, and those in which the shaft stuck.
     error_bound_rad : float or None
-        What is proven of the error, rad; None where nothing is, or was not looked for.
+        The bound proven on the error, rad; None where none is, or none was looked for.
     standing : str
         ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (it sticks from rest),
         ``"strays"``, ``"unstable"``.
     why : str
-        What limits, where it is uncertified or refused; else empty.
+        The limiting condition, where it is uncertified or refused; else empty.
     scenario : Scenario or None
         The whole scenario; None if no gains are stable.
 
@@ -317,7 +317,7 @@ class Tuned:
     winner : Candidate or None
         The one that is given out; None if none is certified, or none starts from rest.
     verdict : str
-        What is proven of it, with its scope; or what limits.
+        The proven property of it, with its scope; or the limiting condition.
     rates_deg_s : tuple of float
         Rates that it was tuned for, °/s.
     simulated_s : float
@@ -463,7 +463,7 @@ def tune(
     scenario : Scenario, str or path
         A scenario of the rig whose path is a ramp.
     identified : Identified, optional
-        What :func:`clutch.identify` found; default: the scenario's model and bounds, with delay and ripple of its rig.
+        The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with delay and ripple of its rig.
     rates_deg_s : iterable of float, optional
         Rates at which it is to be smooth, °/s; default: the scenario's own.
     candidates : int, default 32

@@ -1246,7 +1246,7 @@ def identified(found: Identified) -> Figure:
     Parameters
     ----------
     found : Identified
-        What :func:`clutch.identify` found.
+        The findings of :func:`clutch.identify`.
 
     Returns
     -------

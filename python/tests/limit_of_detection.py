@@ -1,4 +1,4 @@
-"""The earliest time at which counts can tell that a converter stands at 0 V.
+"""The earliest time at which counts can show that a converter stands at 0 V.
 
 A detector that ends no sound run has to wait until no shaft of the bounds could have given the counts. Here the set of
 those shafts is followed: a polygon of positions and velocities, moved by every torque of the bounds and cut by every

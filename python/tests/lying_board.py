@@ -283,7 +283,7 @@ class Board:
                 self.go_on()
         except (EOFError, ConnectionError, TimeoutError):
             pass
-        except Exception as error:  # told by the trial
+        except Exception as error:  # reported by the trial
             self.failure = error
         finally:
             self.listener.close()

@@ -1,4 +1,4 @@
-"""What a program draws on a terminal: its screen, and that as a page."""
+"""The drawing of a program on a terminal: its screen, and that as a page."""
 
 import codecs
 import fcntl

@@ -1,4 +1,4 @@
-"""The earliest at which counts can tell a converter at 0 V: the limit that docs/safety.md states."""
+"""The earliest at which counts can show a converter at 0 V: the limit that docs/safety.md states."""
 
 import limit_of_detection as limit
 

@@ -270,7 +270,7 @@ def test_it_fits_both_sizes_and_both_schemes(page, size, scheme, tmp_path):
         page.run(press)
         box = page.run("document.querySelector('#steps [aria-pressed=true]').getBoundingClientRect().toJSON()")
         assert box["left"] >= 0 and box["right"] <= size[0], press
-    # Whoever moves a slider on a phone sees what it does.
+    # On a phone, moving a slider shows its effect.
     page.run("document.getElementById('law-glide-kp_1_s').scrollIntoView({block: 'center'})")
     top = page.run("document.querySelector('#position').getBoundingClientRect().toJSON()")
     slider = page.run("document.getElementById('law-glide-kp_1_s').getBoundingClientRect().toJSON()")

@@ -34,7 +34,7 @@ def test_an_exported_channel_has_every_number_with_its_unit_and_its_meaning(smc_
     assert table.column_names == ours.columns
     for name in ours.columns:
         there, here = table[name].to_pylist(), list(ours[name])
-        # Bit for bit: repr tells −0.0 from 0.0, and equals itself for a NaN.
+        # Bit for bit: repr distinguishes −0.0 from 0.0, and equals itself for a NaN.
         assert repr(there) == repr([x.item() if hasattr(x, "item") else x for x in here]), name
         metadata = {k.decode(): v.decode() for k, v in (table.schema.field(name).metadata or {}).items()}
         assert metadata == ours.attributes(name), name

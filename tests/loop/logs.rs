@@ -187,9 +187,9 @@ fn summary_and_log_tell_how_late_wake_ups_were() {
     // No clock wakes a thread before its time, and none in less than no time.
     assert!(count >= 400 && late.iter().filter(|us| **us > 0).count() > late.len() / 2, "{count}: {late:?}");
     assert!(late.iter().all(|us| f64::from(*us) <= most), "{most}: {late:?}");
-    // With the board's samples, and a board whose clock waits for this machine, nothing can be told.
+    // With the board's samples, and a board whose clock waits for this machine, nothing can be measured.
     let args = ["loop", "--duration=0.5", "--set=run.settle_s=0"];
-    let _ = run(&args).expect(0).prints(&["wake-up late by p50 / p99 / p99.9 / max", "not told"]);
+    let _ = run(&args).expect(0).prints(&["wake-up late by p50 / p99 / p99.9 / max", "not measured"]);
 }
 
 #[test]

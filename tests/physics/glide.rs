@@ -93,7 +93,7 @@ fn from_rest_it_is_smooth_within_150_ms_whatever_friction_it_believes() {
         ];
         discs(1, 50, &keys)
     };
-    // Table 1; 0.89, 1.4 and 0.6 times the friction of the bench, 0.104. Who believes too little starts less well.
+    // Table 1; 0.89, 1.4 and 0.6 times the friction of the bench, 0.104. A law that believes too little starts less well.
     for (times, sticks) in [(1.0, 0.8), (0.614, 1.0), (0.971, 0.8), (0.416, 1.3)] {
         let all = start(0.0, times);
         assert!(most(&all, |m| m.stick_slip_cycles_per_s) <= 4.0);

@@ -10,7 +10,7 @@ use std::time::Instant;
 pub(crate) const TARGETS: [(&str, u32); 4] =
     [("decoder", 700_000), ("log", 110_000), ("request", 200_000), ("board_controller", 7000)];
 
-/// What a fuzzed target is watched for.
+/// The defects for which a fuzzed target is watched.
 #[derive(Clone, Copy)]
 pub(crate) enum Watched {
     /// Panics, and each access of memory, by the address sanitizer.
@@ -37,7 +37,7 @@ impl Watched {
     }
 }
 
-/// Fuzzes every target, or only one, for `seconds` each; or for so many executions, told in docs/proof.md.
+/// Fuzzes every target, or only one, for `seconds` each; or for so many executions, reported in docs/proof.md.
 pub(crate) fn all(watched: Watched, seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
     install()?;
     for (target, _) in TARGETS.iter().filter(|(t, _)| only.is_none_or(|o| o == *t)) {
@@ -50,7 +50,7 @@ pub(crate) fn all(watched: Watched, seconds: u32, executions: Option<u64>, only:
     Ok(())
 }
 
-/// Fuzzes one target in steps, so that a run that is ended early has told what it did.
+/// Fuzzes one target in steps, so that a run that is ended early has reported what it did.
 fn counted(target: &str, watched: Watched, executions: u64) -> Result<()> {
     const STEP: u64 = 10_000_000;
     let (begun, mut done) = (Instant::now(), 0);

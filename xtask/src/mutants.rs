@@ -26,7 +26,7 @@ pub(crate) fn run(shard: &str) -> Result<()> {
         declare(&tree.join(folder))?;
     }
     let out = root().join("target/mutants").join(shard.replace('/', "-of-"));
-    // A mutant that is missed is no failure of this verb: the table tells it.
+    // A mutant that is missed is no failure of this verb: the table reports it.
     let _ = program("nice")
         .args([
             "-n",

@@ -45,7 +45,7 @@ pub(crate) fn module() -> Result<Option<PathBuf>> {
     Ok(Some(folder.join(TARGET).join("web/clutch_web.wasm")))
 }
 
-/// Sizes of page and module, also as a server sends them, if there is a Node to tell.
+/// Sizes of page and module, also as a server sends them, if there is a Node to measure them.
 pub(crate) fn sizes(built: &Playground) -> Result<()> {
     for file in [&built.module, &built.page] {
         let raw = std::fs::metadata(file)?.len();

@@ -94,7 +94,7 @@ fn check_with(version: &str, folder: &Path, args: &[&str]) -> Result<()> {
 pub(crate) fn semver() -> Result<()> {
     let list = ["tag", "--list", "v[0-9]*", "--merged", "HEAD", "--sort", "-version:refname"];
     let (listed, tags) = program("git").args(list).quietly()?;
-    ensure!(listed, "git does not tell the tags: {tags}");
+    ensure!(listed, "git does not list the tags: {tags}");
     let Some(last) = tags.lines().next() else {
         println!("no tag v* yet: there is no interface to keep");
         return Ok(());

@@ -25,7 +25,7 @@ pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
     program(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(args)
 }
 
-/// Starts this program anew where it would compile incrementally, if nobody has asked for that. What is compiled once, in a
+/// Starts this program anew where it would compile incrementally, if nobody has asked for that. A single compilation, of a
 /// tree that is new, would take a minute more.
 pub(crate) fn without_incremental() -> Result<()> {
     #[cfg(unix)]
@@ -103,7 +103,7 @@ impl Program {
         nice
     }
 
-    /// Whatever was set for this process.
+    /// Removes a variable, whatever this process has set.
     pub(crate) fn without(mut self, key: &str) -> Self {
         self.0.env_remove(key);
         self

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with the multipliers `λ ≥ 0` of the file, the constraints `a_j·y ≤ b_j` of the set and of the mode, and `|y|` from the set's
-//! own walls. Whoever made the multipliers, a certificate that passes bounds the error.
+//! own walls. A certificate that passes bounds the error, whoever made the multipliers.
 
 mod interval;
 mod law;

@@ -107,7 +107,7 @@ fn mode<const N: usize>(u: &Units, piece: &Piece, form: Form, id: ModeId) -> Opt
     let mut within = Constraints::new();
     let mut at_most = |a: &Affine<N>, limit: f64| within.push(&a.weights, limit - a.constant);
 
-    // Whatever the mode: the shaft never runs backwards, the encoder rounds down, and so the filter's rate is at most the path's.
+    // In every mode the shaft never runs backwards, the encoder rounds down, and so the filter's rate is at most the path's.
     at_most(&Affine::of(S, 1.0), u.path);
     let rounding = measured.plus(&Affine::of(E, 1.0), -1.0);
     at_most(&rounding, 1.0 + measured_off);

@@ -135,7 +135,7 @@ pub enum Gains {
         #[serde(default)]
         forward: f64,
     },
-    /// PD with an integral `I` of the error, in volts: `u = u_f + I − (K_p e + K_d ė)`. What a limit cuts off it takes back, and
+    /// PD with an integral `I` of the error, in volts: `u = u_f + I − (K_p e + K_d ė)`. It takes back the part that a limit cuts off, and
     /// it stays within what the output can answer.
     Pid {
         /// `K_p`, V/rad.
@@ -162,7 +162,7 @@ pub enum Gains {
         /// `ε`, rad/s.
         boundary: f64,
     },
-    /// Whatever law within a shell: any voltage of the output's range while `|σ| < S`, the highest from `σ = −S` on, the
+    /// Any law within a shell: any voltage of the output's range while `|σ| < S`, the highest from `σ = −S` on, the
     /// lowest from `σ = S` on.
     Shell {
         /// `f`, 1/s.

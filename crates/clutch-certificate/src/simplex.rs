@@ -60,7 +60,7 @@ impl<const N: usize> Constraints<N> {
         })
     }
 
-    /// How much `y` breaks some constraints, from one on.
+    /// The amounts by which `y` breaks some constraints, from one on.
     #[inline]
     fn broken<const K: usize>(&self, y: &[f64; N], begin: usize) -> [f64; K] {
         let mut sums = [0.0; K];
@@ -185,7 +185,7 @@ impl<const N: usize> Program<'_, N> {
                 }
             }
             let Some((p, ratio)) = leaving else {
-                // Whatever y is, the entering constraint and the basis contradict each other, but for rounding.
+                // For any y the entering constraint and the basis contradict each other, but for rounding.
                 if w.iter().any(|w| *w > ROUNDING * by) {
                     break;
                 }

@@ -280,7 +280,7 @@ fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
     refused("", "EOF");
     refused(&text[..text.len() / 2], "EOF");
     refused(&text.replacen("\"version\":1", "\"version\":2", 1), "version is 2: expected 1");
-    // Whatever else that version has.
+    // Any other content that the version may have.
     refused("{\"version\":2,\"proof\":[]}", "version is 2: expected 1");
     refused(&text.replacen("\"inertia\"", "\"inertai\"", 1), "inertai");
     refused(&text.replacen("\"kp\":5000.0", "\"kp\":\"much\"", 1), "f64");

@@ -40,7 +40,7 @@ impl NotHere {
 /// The refusal of what is asked for, and what it needs that is not here.
 pub(crate) fn not_here(asked: &str, needs: &str) -> anyhow::Error {
     anyhow!(
-        "clutch {asked}: not on {}: {needs} are made for Linux. What needs no board runs here: sim, certify, tune, map, \
+        "clutch {asked}: not on {}: {needs} are made for Linux. Verbs that need no board run here: sim, certify, tune, map, \
          replay, log, identify with --from or on its simulated board; docs/platforms.md",
         std::env::consts::OS
     )

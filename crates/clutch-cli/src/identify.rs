@@ -294,7 +294,7 @@ fn text(report: &Identified) -> String {
     }
     for row in &rows {
         if let Finding::Refused(why) = row.finding {
-            out += &paragraph(&format!("{}: not told; {why}", row.label));
+            out += &paragraph(&format!("{}: not determined; {why}", row.label));
         }
     }
     report.unexplained().iter().for_each(|line| out += &paragraph(&format!("unexplained: {line}")));
@@ -310,7 +310,7 @@ fn one_by_one(separate: &Separate) -> String {
                 let interval = format!("{} … {}", number(e.low), number(e.high));
                 out += &format!("  {label:<26}{:>10}  {interval:<24}{unit}\n", number(e.value));
             }
-            Finding::Refused(why) => out += &paragraph(&format!("{label}: not told; {why}")),
+            Finding::Refused(why) => out += &paragraph(&format!("{label}: not determined; {why}")),
         }
     }
     out

@@ -29,7 +29,7 @@ pub(crate) fn image(named: PathBuf) -> anyhow::Result<PathBuf> {
     let Some((_, target)) = NAMES.iter().find(|(name, _)| Path::new(name) == named) else {
         let name = named.display().to_string();
         let meant = nearest(&name, &NAMES.map(|(name, _)| name));
-        // A file that is missing is told by what would have read it.
+        // A file that is missing is reported by what would have read it.
         anyhow::ensure!(meant.is_empty(), "--image {name}: no such file, and no image of that name{meant}");
         return Ok(named);
     };

@@ -285,7 +285,7 @@ impl Loop {
 
 /// Prints what has happened, on standard error, after `clear`, with verdicts in colour on a terminal.
 fn tell_aside(clear: &str, text: &str) {
-    // What clears a line is no colour: it stays where colours are left out.
+    // The text that clears a line is no colour: it stays where colours are left out.
     let _ = std::io::stderr().write_all(clear.as_bytes());
     let _ = anstream::stderr().write_all(coloured(&shown(&paragraph(text))).as_bytes()); // a terminal that has gone away
 }

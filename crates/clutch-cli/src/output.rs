@@ -155,7 +155,7 @@ fn shows_source(line: &str) -> bool {
 /// The begin of an error: who says it.
 pub(crate) const SPEAKER: &str = "clutch:";
 
-/// Prints an error; a terminal gets it in lines of its own. What else reads it may look for a line as it is.
+/// Prints an error; a terminal gets it in lines of its own. Other readers may look for a line as it is.
 pub(crate) fn complain(text: &str) {
     let text = shown(text);
     let text = if std::io::stderr().is_terminal() { folded(&text) } else { format!("{text}\n") };

@@ -223,7 +223,7 @@ fn text(s: &Summary<'_>, scenario: &Scenario, run: &Run) -> String {
     }
     if let Some(MapInRun { within, drove, dropped_s }) = s.friction_map {
         let told = match dropped_s {
-            None if within == 0.0 => "the shaft never was where it tells friction".to_owned(),
+            None if within == 0.0 => "the shaft never was within it".to_owned(),
             None => {
                 let percent = |share: f64| number(100.0 * share);
                 format!(

@@ -515,7 +515,7 @@ fn the_report_begins_with_three_sentences_and_the_figures_and_prints_80_columns(
     let (figures, claims) = (at("<h2 id=\"figures\">"), at("<h2 id=\"claims\">"));
     assert_eq!(page[..figures].matches("<p class=\"lead\">").count(), 3);
     assert!(at("<svg") > figures && at("<svg") < claims);
-    // The sentences tell what was computed.
+    // The sentences say what was computed.
     let report = std::fs::read_to_string(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let slowest = &report["table3"][2];
@@ -815,7 +815,7 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
             .concat(),
     );
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
-    assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not told; "), "{}", out(&o));
+    assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not determined; "), "{}", out(&o));
     assert!(out(&o).ends_with(&format!("\nwrote {rig}\n")), "{}", out(&o));
     assert!(narrow(&err(&o)), "{}", err(&o));
     // All that is printed fits a terminal.
@@ -829,7 +829,7 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     let ends = [inertia[0].as_f64(), inertia[1].as_f64()].map(Option::unwrap);
     assert!(ends[0] < truth && truth < ends[1] && ends[1] / ends[0] < 1.03, "{truth}: {inertia}");
 
-    // The logs tell the same, and one of them what it can.
+    // The logs give the same, and one of them what it can.
     let o = clutch(&["identify", "--json", "--from", &format!("{logs}/releases.mcap")]);
     let told: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
     let pull = &told["parameters"]["pull_rad_s2"];
@@ -888,8 +888,12 @@ fn identify_asks_for_consent_on_a_board_and_names_what_it_cannot_read() {
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("has no column \"counts\": expected one of: n, u"), "{}", err(&o));
     let o = clutch(&["identify", "--from", &table, "--columns", "n,u"]);
-    assert_eq!(o.status.code(), Some(1), "two samples tell nothing");
-    assert!(out(&o).contains("T/J: not told; no release: 0 V for 30 ms from rest tells it"), "{}", out(&o));
+    assert_eq!(o.status.code(), Some(1), "two samples show nothing");
+    assert!(
+        out(&o).contains("T/J: not determined; no release: 0 V for 30 ms from rest determines it"),
+        "{}",
+        out(&o)
+    );
     std::fs::write(dir.join("x.mcap"), b"no log").expect("a file");
     let o = clutch(&["identify", "--from", &dir.join("x.mcap").display().to_string()]);
     assert_eq!(o.status.code(), Some(1));
@@ -922,7 +926,7 @@ fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped(
     let alone = sim(&["--set", "run.seed=2"]);
     assert!(rms(&other) < 1.1 * rms(&alone), "{} with another's map, {} without", rms(&other), rms(&alone));
 
-    // A file of before versions were told is of the first; one of a later is refused.
+    // A file of before versions were stated is of the first; one of a later is refused.
     let text = std::fs::read_to_string(&map).expect("the map");
     assert_eq!(text.matches("\nversion = 1\n").count(), 1, "{text}");
     let of = |name: &str, version: &str| {

@@ -91,7 +91,7 @@ fn foxgloves_layout_draws_both_kinds_of_log() {
             let drawn = logs.iter().any(|log| is_drawn(path, '.', log));
             assert!(drawn || ["/parameters", "/event"].contains(path), "{path}: in neither log");
         }
-        // What a loop alone or a simulation alone has stands beside what both have, or alone.
+        // A curve of a loop alone or of a simulation alone stands beside those of both, or alone.
         let in_both = paths.iter().filter(|path| logs.iter().all(|log| is_drawn(path, '.', log)));
         let curves = in_both.count();
         match name.as_str() {

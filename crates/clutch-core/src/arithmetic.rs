@@ -70,7 +70,7 @@ pub trait Arithmetic:
     /// Neither infinite nor NaN.
     fn is_finite(self) -> Self::Mask;
 
-    /// What `a` gives where the mask is true, what `b` gives elsewhere. A scalar asks the one that it needs, a vector both.
+    /// The result of `a` where the mask is true, that of `b` elsewhere. A scalar asks the one that it needs, a vector both.
     #[inline(always)]
     fn branch(mask: Self::Mask, a: impl FnOnce() -> Self, b: impl FnOnce() -> Self) -> Self {
         Self::select(mask, a(), b())

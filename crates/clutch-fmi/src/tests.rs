@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
 
-/// What units say.
+/// Messages of units.
 type Said = RefCell<Vec<String>>;
 
 /// Keeps what a unit says.

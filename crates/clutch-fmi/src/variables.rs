@@ -146,7 +146,7 @@ impl Part {
         }
     }
 
-    /// The text that tells the library which unit is meant, and of which version.
+    /// The text by which the library knows which unit is meant, and of which version.
     pub(crate) fn token(self) -> String {
         format!("clutch-{}-{}", self.name(), env!("CARGO_PKG_VERSION"))
     }

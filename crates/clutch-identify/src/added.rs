@@ -110,13 +110,13 @@ pub fn separate(alone: &Report, with: &Report, added: &Added) -> Separate {
     let ratio = quotient(v2, v1);
     if ratio.low <= 1.0 {
         return all(refused(
-            "v_hold with the mass is not surely above that without: a heavier mass, a fifth of the load or more, tells it",
+            "v_hold with the mass is not surely above that without: a heavier mass, a fifth of the load or more, determines it",
         ));
     }
     let by = |ratio: f64| added.torque() / (ratio - 1.0);
     let torque = Estimate { value: by(ratio.value), low: by(ratio.high), high: by(ratio.low) };
     let inertia = quotient(torque, p1);
-    // With the mass T/J has to be what both then give. A mass that is told wrong scales all alike, and is not seen.
+    // With the mass T/J has to be what both then give. A mass that is given wrong scales all alike, and is not seen.
     let then = |torque: f64, inertia: f64| (torque + added.torque()) / (inertia + added.inertia());
     if then(torque.high, inertia.low) < p2.low || then(torque.low, inertia.high) > p2.high {
         return all(Finding::Refused(format!(

@@ -12,7 +12,7 @@ use toml::{Table, Value};
 pub struct Believed {
     /// `[rig]` is `[model]`, with sensor, converter and torque noise of the scenario's rig; it begins at rest.
     pub scenario: Scenario,
-    /// Reason why the delay told is no whole number of periods, which all that is certified assumes; none if it is one.
+    /// Reason why the delay found is no whole number of periods, which all that is certified assumes; none if it is one.
     pub delay_between: Option<String>,
     /// T/J and T/(μ_d K) of the corners of the bounds, as shares of the believed ones.
     pub corners: Vec<Corner>,
@@ -27,16 +27,16 @@ pub struct Corner {
     pub hold: f64,
 }
 
-/// Stribeck velocity that is reckoned with where none is told, rad/s: the largest of the rigs that identification was tried on.
+/// Stribeck velocity that is reckoned with where none is determined, rad/s: the largest of the rigs that identification was tried on.
 const UNKNOWN_STRIBECK: f64 = 0.005;
 
-/// Waves along the disc of a rig whose file tells of none: those of the rig `bench`.
+/// Waves along the disc of a rig whose file has none: those of the rig `bench`.
 const WAVES: [i64; 2] = [136, 544];
 /// Waves of the believed disc: so few that all of them together, √8 of their root mean square, stay within the bounds that
 /// three make.
 const NUMBER: i64 = 4;
 
-/// The scenario with the rig that it believes in; `file` is what was identified, which also tells delay and ripple: without
+/// The scenario with the rig that it believes in; `file` is what was identified, which also gives delay and ripple: without
 /// it these are those of the scenario's rig.
 ///
 /// # Errors
@@ -83,7 +83,7 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
         let ticks = (delay.value / period).round();
         if !(delay.low..=delay.high).contains(&(ticks * period)) {
             delay_between = Some(format!(
-                "the delay told, {:.2} … {:.2} ms, holds no whole number of periods",
+                "the delay found, {:.2} … {:.2} ms, holds no whole number of periods",
                 1e3 * delay.low,
                 1e3 * delay.high
             ));

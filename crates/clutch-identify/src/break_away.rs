@@ -4,7 +4,7 @@
 //! place, and `μ_d K m u_b = T μ_d/μ_s`: it sets off with `θ̈ = (T/J)(1 − μ_d/μ_s)`, whatever `m` is. Behind that friction changes
 //! along the way, which the filter of [`crate::filter`] follows from there.
 //!
-//! Nobody knows when the shaft broke away: the time is an unknown of each break-away, and what is told is summed over it.
+//! Nobody knows when the shaft broke away: the time is an unknown of each break-away, and the result is summed over it.
 //! By the Stribeck velocity the shaft sets off late: from the step of the voltage that triggered it, one of several, friction
 //! first has to fall.
 
@@ -293,7 +293,7 @@ impl SetOff<'_> {
     }
 }
 
-/// Stribeck velocity, rad/s, over all of the ratio's interval, down to 0 where it is too small to be told; none where the
+/// Stribeck velocity, rad/s, over all of the ratio's interval, down to 0 where it is too small to be determined; none where the
 /// break-aways do not bound it above.
 #[must_use]
 pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: &Estimate, fall: f64) -> Option<Estimate> {

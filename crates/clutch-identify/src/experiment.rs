@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `releases` | PID without an integral on a path of steps | the brake lets go for some 40 ms: free falls |
 //! | `crawl` | a soft PD far below the rate at which it sticks | break-aways under a voltage that falls slowly |
-//! | `ride …` | glide, with what the releases told | mean friction at a rate, ripple |
+//! | `ride …` | glide, with the findings of the releases | mean friction at a rate, ripple |
 //! | `releases_behind` | as `releases` | whether the torque is what it was |
 
 use crate::recording::{ReadError, Recording};
@@ -183,7 +183,7 @@ pub type Runs<'a> = dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, Experim
 /// For a part that a check ended.
 pub const REMEDY: &str = "Wider [bounds] help if they do not hold the rig; look at the rig first";
 
-/// Runs the programme, part by part; `run` makes one run of the loop, and says what was recorded. Later parts are told
+/// Runs the programme, part by part; `run` makes one run of the loop, and says what was recorded. Later parts are given
 /// what earlier ones gave.
 ///
 /// # Errors
@@ -300,7 +300,7 @@ fn glide(
     let law = table([("glide", table([("filter", table([("delay_ticks", Value::Integer(delay as i64))]))]))]);
     let mut t = part(base, law, ramp(rate), seconds)?;
     if let (Some(fall), Some(Value::Table(model))) = (fall, t.get_mut("model")) {
-        // Drive torque stays what it is believed to be: only their ratio is told, and only it matters.
+        // Drive torque stays what it is believed to be: only their ratio is determined, and only it matters.
         let inertia = spec.model.drive_torque / fall.pull.value;
         model.insert("inertia_kg_m2".to_owned(), Value::Float(inertia));
     }
@@ -310,7 +310,7 @@ fn glide(
 /// The scenario's simulated board in virtual time, its shaft where the run before has left it.
 #[derive(Debug, Default)]
 pub struct VirtualBoard {
-    /// Folder for a log of each run, and the version that it tells.
+    /// Folder for a log of each run, and the version that it states.
     logs: Option<(PathBuf, String)>,
     /// One that looks on, and the version that it is told.
     looking: Option<(Looking, String)>,
@@ -319,7 +319,7 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// A board whose runs leave a log each in a folder, which tells this version.
+    /// A board whose runs leave a log each in a folder, which states this version.
     #[must_use]
     pub fn logging(folder: PathBuf, version: &str) -> Self {
         VirtualBoard { logs: Some((folder, version.to_owned())), ..VirtualBoard::default() }

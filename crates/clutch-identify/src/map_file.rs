@@ -5,7 +5,7 @@ use crate::ride::{Place, rides};
 use clutch_sim::Scenario;
 
 /// Friction along the disc where the slowest ride of the recordings went, with T/J and delay as the scenario believes them to
-/// be: for recordings without releases, which would tell both. Empty without a ride.
+/// be: for recordings without releases, which would determine both. Empty without a ride.
 #[must_use]
 pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Place> {
     let spec = scenario.spec();

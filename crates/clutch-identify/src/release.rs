@@ -13,7 +13,7 @@
 use crate::Estimate;
 use crate::recording::Recording;
 
-/// Shortest release that tells something, periods.
+/// Shortest release that shows something, periods.
 const SHORTEST: usize = 8;
 /// Samples of a release that are looked at: its pairs are counted by the million.
 const LONGEST: usize = 120;

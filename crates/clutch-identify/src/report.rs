@@ -12,9 +12,9 @@ use serde::Serialize;
 pub(crate) const DEVIATIONS: f64 = 2.5;
 /// Fall of a logarithm of a likelihood at the ends of an interval.
 pub(crate) const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
-/// Rates that tell C/J lie this far apart, rad/s.
+/// Rates that determine C/J lie this far apart, rad/s.
 const RATES_APART: f64 = 0.5;
-/// Fewest break-aways that tell μ_s/μ_d.
+/// Fewest break-aways that determine μ_s/μ_d.
 const FEWEST_SLIPS: usize = 3;
 /// Share by which μ_s/μ_d may be off on an even disc, where steps of the converter say as much as friction.
 const EVEN: f64 = 0.02;
@@ -27,7 +27,7 @@ pub(crate) const UNEXPLAINED: f64 = 7.0;
 
 /// Rides and releases that do not go together.
 const CONTRADICTED: &str = "C/J of the rides is none that the releases allow: friction differs between the places of the rides, or the \
-     torque between their times; rides over the same whole turns, and releases behind them, tell which";
+     torque between their times; rides over the same whole turns, and releases behind them, show which";
 
 /// The finding on a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -99,7 +99,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     let no_ride = motion
         .cause
         .as_deref()
-        .unwrap_or("a ride at an even rate, as 5 °/s for 8 s, and releases for T/J tell it");
+        .unwrap_or("a ride at an even rate, as 5 °/s for 8 s, and releases for T/J determine it");
     let slowest = motion.told.first();
     Report {
         pull: motion.of_fall(|fall| fall.pull),
@@ -110,16 +110,16 @@ pub fn identify(recordings: &[Recording]) -> Report {
         stribeck,
         damping: motion.damping.map_or_else(
             || {
-                let slow = "it takes a fast ride beside a slow one: 60 °/s beside 20 °/s tell it";
+                let slow = "it takes a fast ride beside a slow one: 60 °/s beside 20 °/s determine it";
                 refused(motion.cause.as_deref().unwrap_or(slow))
             },
             Finding::Known,
         ),
         lag: refused(
-            "the delay holds dead time and lag together: releases from two voltages, far apart, tell them apart",
+            "the delay holds dead time and lag together: releases from two voltages, far apart, separate the two",
         ),
         each: refused(
-            "no counts and volts tell them, as all of them scaled alike move alike; a second experiment with a known mass added \
+            "counts and volts do not determine them, as all of them scaled alike move alike; a second experiment with a known mass added \
              does",
         ),
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
@@ -137,7 +137,7 @@ struct Motion {
     fall: Option<Fall>,
     damping: Option<Estimate>,
     hold: Option<Estimate>,
-    /// The way in which the rig is unlike the model, so that its friction is not told.
+    /// The way in which the rig is unlike the model, so that its friction is not determined.
     cause: Option<String>,
     unexplained: Vec<String>,
 }
@@ -171,13 +171,13 @@ impl Motion {
             }
             unexplained.push(format!(
                 "rides: friction differs by {:.1} % from section to section of the turn, as of a disc that is not square to its \
-                 shaft: v_hold and C/J are as wide as that; rides over whole turns tell them more closely",
+                 shaft: v_hold and C/J are as wide as that; rides over whole turns determine them more closely",
                 100.0 * share
             ));
         }
         let line = Line::through(&told);
         let damping = line.as_ref().and_then(|line| line.damping(&fall));
-        // With C/J, releases tell T/J more closely.
+        // With C/J, releases determine T/J more closely.
         if let Some(c) = damping {
             let within = (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0));
             match release::fall(releases, within) {
@@ -199,7 +199,7 @@ impl Motion {
         Motion { told, fall: Some(fall), damping, hold, cause: None, unexplained }
     }
 
-    /// μ_s/μ_d and the Stribeck velocity, which take all that motion tells.
+    /// μ_s/μ_d and the Stribeck velocity, which take all that motion shows.
     fn at_rest(&self, slips: &[BreakAway<'_>]) -> (Finding, Finding) {
         let (fall, slowest) = (self.fall.as_ref(), self.told.first());
         let known = fall.zip(self.hold).zip(slowest).map(|((fall, hold), slow)| Known {
@@ -219,13 +219,13 @@ impl Motion {
             (e.low, e.high) = (e.low - EVEN * e.value, e.high + EVEN * e.value);
         }
         let stribeck = match fall.and_then(|f| f.looser) {
-            _ if even => {
-                refused("on a disc so even a step of the converter says as much; no experiment here tells it")
-            }
+            _ if even => refused(
+                "on a disc so even a step of the converter says as much; no experiment here determines it",
+            ),
             None => stribeck(slips, known.as_ref(), &ratio),
             Some(_) => refused(
                 "it shows in parts of a millisecond, and the delay differs from release to release by more: an actuator without a \
-                 lag, and a steady torque, would tell it",
+                 lag, and a steady torque, would show it",
             ),
         };
         (ratio, stribeck)
@@ -236,7 +236,7 @@ impl Motion {
         match (&self.fall, &self.cause) {
             (Some(fall), _) => Finding::Known(value(fall)),
             (None, Some(cause)) => refused(cause),
-            (None, None) => refused("no release: 0 V for 30 ms from rest tells it"),
+            (None, None) => refused("no release: 0 V for 30 ms from rest determines it"),
         }
     }
 }
@@ -329,18 +329,18 @@ fn hold(told: &[Told], line: Option<&Line>, fall: Option<&Fall>) -> Option<Estim
 
 fn ratio(slips: &[BreakAway<'_>], known: Option<&Known>) -> Finding {
     let Some(known) = known else {
-        return refused("it takes T/J and v_hold, which releases and a ride tell");
+        return refused("it takes T/J and v_hold, which releases and a ride determine");
     };
     if slips.len() < FEWEST_SLIPS {
         return Finding::Refused(format!(
             "{} break-aways of the {FEWEST_SLIPS} that it takes: a crawl at 0.5 °/s under a soft law, \
-             or a voltage that falls by one code each 10 ms, tells it",
+             or a voltage that falls by one code each 10 ms, determines it",
             slips.len()
         ));
     }
     match break_away::ratio(slips, known, FALL) {
         Some(estimate) => Finding::Known(estimate),
-        None => refused("the break-aways do not bound it: more of them, from a slower ramp, tell it"),
+        None => refused("the break-aways do not bound it: more of them, from a slower ramp, determine it"),
     }
 }
 
@@ -355,6 +355,8 @@ fn stribeck(slips: &[BreakAway<'_>], known: Option<&Known>, ratio: &Finding) -> 
     }
     match break_away::stribeck(slips, known, ratio, FALL) {
         Some(estimate) => Finding::Known(estimate),
-        None => refused("the break-aways do not bound it: more of them, from a slower ramp, may tell it"),
+        None => {
+            refused("the break-aways do not bound it: more of them, from a slower ramp, may determine it")
+        }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A shaft that moves evenly at `v` says `1 = (h + r) u + (c/g) v` with `h = μ_d K/T`, `g` = T/J and `c = C_d/J`, so that a
 //! ride gives `1/h_v = (1/h) (1 − (c/g) v)`: a straight line over the rates, whose value at 0 is `v_hold = 1/h` and whose slope
-//! tells C/J.
+//! gives C/J.
 
 use crate::filter::{Belief, Passed, Shaft, Spread, smooth};
 use crate::recording::Recording;
@@ -35,7 +35,7 @@ pub const WAVES_PER_TURN: f64 = 340.0;
 pub const WAVE_DAMPING: f64 = 0.25;
 /// Wander of the velocity that no friction explains, rad/s/√s.
 pub const WALK: f64 = 0.01;
-/// The same two for a map, whose places are told one by one and not in the mean.
+/// The same two for a map, whose places are found one by one and not in the mean.
 const MAP_WAVE_DAMPING: f64 = 0.2;
 const MAP_WALK: f64 = 0.02;
 /// Time at the beginning of a ride, with its break-away, that a map leaves out, s.
@@ -180,7 +180,7 @@ fn shaft_with(
 
 impl Ride<'_> {
     /// Friction along the way, for T/J (rad/s²) and delay (s) as known. Damping is left in friction: see the head of this
-    /// file. `share`: the ripple's size as a share of friction, or none, if this ride is to tell it.
+    /// file. `share`: the ripple's size as a share of friction, or none, if this ride is to find it.
     #[must_use]
     pub fn told(&self, pull: f64, delay: f64, share: Option<f64>) -> Told {
         let r = self.recording;
@@ -271,7 +271,7 @@ impl Ride<'_> {
             let (before, now) = (r.ticks[i].counts, r.ticks[i + 1].counts);
             if now > before {
                 let surprise = belief.cross((now - origin) as f64, 0.5 * rate).square;
-                // The first edges tell where it is.
+                // The first edges show where it is.
                 if i > begin + 100 && surprise > worst.1 {
                     worst = (i + 1, surprise);
                 }
@@ -281,7 +281,7 @@ impl Ride<'_> {
         (out, (worst.0, f64::sqrt(worst.1)))
     }
 
-    /// Logarithm of the density of the edges, with friction as another ride has [told](Self::told) it, where a voltage takes effect over a way, rad.
+    /// Logarithm of the density of the edges, with friction as another ride has [found](Self::told) it, where a voltage takes effect over a way, rad.
     #[must_use]
     pub fn density(&self, told: &Told, pull: f64, delay: f64, over: f64) -> f64 {
         let r = self.recording;

@@ -29,7 +29,7 @@ pub(crate) fn need(parameter: &'static str, finding: &Finding) -> Result<Estimat
     }
 }
 
-/// The file. Drive torque and brake gain are those of the scenario's model: counts and volts tell the other parameters
+/// The file. Drive torque and brake gain are those of the scenario's model: counts and volts give the other parameters
 /// as ratios to them, and so does all that is calculated from them.
 ///
 /// # Errors
@@ -79,9 +79,9 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
         ("identified".to_owned(), Value::Table(intervals(&ROWS, report))),
     ]);
     Ok(format!(
-        "# What `clutch identify` found for: {}\n\
+        "# Findings of `clutch identify` for: {}\n\
          # For `clutch certify`, `clutch loop` and `clutch sim`: --identified THIS_FILE.toml puts [model] and [bounds] into a\n\
-         # scenario. Drive torque and brake gain are the scenario's own: only ratios to them can be told, and matter.\n\n{file}",
+         # scenario. Drive torque and brake gain are the scenario's own: only ratios to them can be determined, and matter.\n\n{file}",
         scenario.name().replace(['\n', '\r'], " ")
     ))
 }

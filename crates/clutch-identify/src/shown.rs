@@ -4,7 +4,7 @@ use crate::motor;
 use crate::report::{Finding, Report};
 use clutch_core::params::{MS, PER_S, PERCENT, RAD_S2, V, V_S_RAD, V_S2_RAD};
 
-/// A parameter that recordings may tell, in a report of that kind.
+/// A parameter that recordings may determine, in a report of that kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<R> {
     /// Key in files and JSON, SI.

@@ -19,10 +19,10 @@ const EXCEEDED: f64 = 4.0;
 const LEAST_RUNOUT: f64 = 5e-3;
 
 /// The words on a torque that varies.
-const VARIES: &str = "a torque that varies, as a hand's, and nothing is told under it; a weight as the drive does, and releases before \
+const VARIES: &str = "a torque that varies, as a hand's, and nothing is determined under it; a weight as the drive does, and releases before \
      and behind the rides that agree show that the torque is steady";
 
-/// The reason why releases tell no T/J.
+/// The reason why releases determine no T/J.
 #[must_use]
 pub fn fall_refused(at: &Unexplained) -> String {
     match at.apart {
@@ -34,20 +34,20 @@ pub fn fall_refused(at: &Unexplained) -> String {
         }
         Some(Apart::Delays(low, high)) => format!(
             "the releases have delays between {:.1} and {:.1} ms: an actuator with a lag; one with a lag of less than two periods, \
-             or releases from one voltage alone, tell it",
+             or releases from one voltage alone, determine it",
             1e3 * low,
             1e3 * high
         ),
         None => format!(
             "{}: no free fall with any delay explains the counts up to tick {}: a count that was lost, a \
-             shaft that was not at rest before or not let go at once, or a torque that varies; releases from a longer rest tell which",
+             shaft that was not at rest before or not let go at once, or a torque that varies; releases from a longer rest show which",
             at.name, at.tick
         ),
     }
 }
 
-/// The reason why friction is not told, if in stretches of motion, uneven ones among them, a voltage takes effect over a way;
-/// `told`: friction, by a ride.
+/// The reason why friction is not determined, if in stretches of motion, uneven ones among them, a voltage takes effect over a way;
+/// `told`: friction, found from a ride.
 #[must_use]
 pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<String> {
     let density = |counts: f64| -> f64 {
@@ -66,7 +66,7 @@ pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<Stri
     }
     Some(format!(
         "a voltage takes effect over some {counts} counts of the way, and so the later the slower the shaft: bristles that do not scale \
-         with the brake's force, or play of the pad; a pad that is held more stiffly tells friction, and a ride at 5 °/s then shows \
+         with the brake's force, or play of the pad; a pad that is held more stiffly shows friction, and a ride at 5 °/s then shows \
          no such way"
     ))
 }

@@ -22,7 +22,7 @@ pub(crate) struct Message {
     pub(crate) data: Vec<u8>,
 }
 
-/// A run that is told of.
+/// A run that is reported.
 #[derive(Debug)]
 pub(crate) struct Run {
     /// Its number, from 1.

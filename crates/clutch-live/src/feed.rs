@@ -205,7 +205,7 @@ impl Feed {
 
     /// The frame since the last one; none if nothing has come.
     fn frame(&mut self) -> Option<Frame> {
-        // A change of state is told also where no sample follows it.
+        // A change of state is reported also where no sample follows it.
         if self.all.time_s.is_empty() && self.all.state == self.told {
             return None;
         }
@@ -303,7 +303,7 @@ mod tests {
         };
         let done = "running → holding: the path is done".to_owned();
         assert_eq!(told(EventKind::Ended, 4, Cause::Done), (2.5, done, false));
-        let lost = "running → faulted: 2 samples lost within 128 cycles".to_owned();
+        let lost = "running → faulted: 2 samples lost within 128 periods".to_owned();
         assert_eq!(told(EventKind::StateChange, 6, Cause::Lost), (2.5, lost, true));
         assert!(told(EventKind::Drift, 3, Cause::None).2);
         let change = ChangeRecord {

@@ -181,7 +181,7 @@ impl Figures {
         };
         let (target, position) = (line(|p| p.target), line(|p| p.position));
         let values = target.iter().chain(&position).map(|point| point.1);
-        // The path is of dots, so that it can be told without colours.
+        // The path is of dots, so that it can be distinguished without colours.
         let datasets = vec![
             dataset(&target, Marker::Dot, self.in_colour(Color::Gray)),
             dataset(&position, Marker::Braille, self.in_colour(Color::Cyan)),
@@ -248,7 +248,7 @@ impl Figures {
             (true, _) => ("answers", &self.answers),
             (false, true) => ("wake-ups", &self.wake_ups),
             (false, false) => {
-                frame.render_widget("latency: not told", area);
+                frame.render_widget("latency: not measured", area);
                 return;
             }
         };

@@ -270,7 +270,7 @@ impl Client {
         Ok(())
     }
 
-    /// Tells what is new; true if there is nothing more to come.
+    /// Reports what is new; true if there is nothing more to come.
     fn tell(&mut self) -> Result<bool, Error> {
         if self.begins.is_some_and(|at| at <= Instant::now()) || self.place.closed() {
             self.place.begin();

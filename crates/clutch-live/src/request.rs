@@ -149,7 +149,7 @@ pub fn asked<'a>(head: &'a [u8], gate: &Gate) -> Result<Option<Asked<'a>>, Denie
     if method == by { Ok(Some(asked)) } else { Err(Denied::Method) }
 }
 
-/// Compares in a time that does not tell where two differ.
+/// Compares in a time that does not show where two differ.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }

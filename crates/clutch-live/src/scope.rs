@@ -154,7 +154,7 @@ impl Screen {
         static HOOK: Once = Once::new();
         HOOK.call_once(|| {
             let before = panic::take_hook();
-            // A panic is told where it can be read.
+            // A panic is reported where it can be read.
             panic::set_hook(Box::new(move |panic| {
                 leave();
                 before(panic);

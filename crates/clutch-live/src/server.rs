@@ -125,7 +125,7 @@ fn head(status: &str, kind: &str) -> String {
 fn events(stream: &mut TcpStream, mut reader: crate::kept::Reader) -> io::Result<()> {
     stream.write_all(format!("{}\r\n", head("200 OK", "text/event-stream")).as_bytes())?;
     while let Some(messages) = reader.next(ALIVE) {
-        // A comment, where there is nothing to tell.
+        // A comment, where there is nothing to report.
         let mut text = if messages.is_empty() { ": \n\n".to_owned() } else { String::new() };
         for message in messages {
             text += &format!("event: {}\ndata: {}\n\n", message.kind, message.json);

@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Upper ends of the histogram's classes, µs; the last class has none.
 const CLASSES: [u32; 13] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
 
-/// A view of the runs that a feed tells of. The feed's thread calls it: nothing in it waits for anybody who looks.
+/// A view of the runs that a feed reports. The feed's thread calls it: nothing in it waits for anybody who looks.
 pub(crate) trait View: Debug + Send + Sync {
     /// A run begins.
     fn begin(&self, header: &Header, run: &Opening<'_>);

@@ -2,7 +2,7 @@
 //! form; fails if there is one.
 //!
 //! `cargo run --release -p clutch-loop --example campaign -- RUNS [SEED [FILE]]` makes runs from a seed on; with a file it
-//! goes on where it was ended. `… -- only RUN…` makes single runs, by name, and tells about them; `… -- until RUNS` makes so
+//! goes on where it was ended. `… -- only RUN…` makes single runs, by name, and reports on them; `… -- until RUNS` makes so
 //! many, and ends with the first that fails. `… -- row LAW TROUBLE RUNS [SEED]` makes those runs alone that have this law and
 //! this trouble, named as in the table, and that have to end: those that came nearest to their promise.
 

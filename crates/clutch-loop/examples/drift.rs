@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
-/// Laws, as readers are told them, and their part of a scenario.
+/// Laws, by their names for readers, and their part of a scenario.
 const LAWS: [(&str, &str); 5] = [
     ("PD", "[law.pd]"),
     ("CTC", "[law.ctc]"),

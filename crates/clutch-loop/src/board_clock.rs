@@ -1,7 +1,7 @@
 //! A board's clock by this machine's, before consent: its time, and the samples that it takes.
 //!
-//! Each look is a request and its answer. Whatever the board did at the answer it did between the two, and the samples that
-//! came before the answer it took before. So two looks bound the board's rate from below and from above, however long a busy
+//! Each look is a request and its answer. The board did all that the answer shows between the two, and took the samples that
+//! came before the answer before it. So two looks bound the board's rate from below and from above, however long a busy
 //! machine or a slow line held each of them up: a board that is right is never refused, and a look that says little is
 //! followed by another. A board may itself be held up between an answer and a sample; so it is believed soon, and refused
 //! only after a second, of which that is no share.

@@ -388,7 +388,7 @@ impl<'a, S: Station> Control<'a, S> {
             self.station.receive(now, bytes, &mut self.out, &mut notices);
             self.station.poll(now, &mut self.out, &mut notices);
         }
-        // A cycle that the board did not tell of is missing like one that the log did not take.
+        // A cycle that the board did not report is missing like one that the log did not take.
         let untold = self.station.standing().untold;
         lost_records += 2 * untold.saturating_sub(self.untold);
         self.untold = untold;

@@ -28,7 +28,7 @@ use serde_json::{Value, json};
 
 /// Slices of a mean.
 const SLICES: usize = 16;
-/// Windows, each of slices that are so many of the one before: they tell less soon, and smaller drifts.
+/// Windows, each of slices that are so many of the one before: they report less soon, and smaller drifts.
 const LEVELS: usize = 4;
 const LONGER: u64 = 4;
 /// A slice takes at least this time, s, this way, rad, and so many counts.
@@ -112,7 +112,7 @@ pub struct DriftReport {
     pub alarms: u64,
     /// The first of them.
     pub first: Option<Alarm>,
-    /// False if the model has no friction that could be told.
+    /// False if the model has no friction that could be determined.
     pub has_friction: bool,
 }
 
@@ -140,8 +140,8 @@ impl DriftReport {
                 if self.alarms > 0 { "" } else { "not " },
                 if self.one_sided == self.windows { "; sticks hide what is below" } else { "" }
             ),
-            None if self.has_friction => "not told: too little motion without a stand".to_owned(),
-            None => "not told: the model has no friction".to_owned(),
+            None if self.has_friction => "not determined: too little motion without a stand".to_owned(),
+            None => "not determined: the model has no friction".to_owned(),
         }
     }
 

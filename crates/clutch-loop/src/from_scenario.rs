@@ -264,7 +264,7 @@ pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, boo
     let volts =
         clutch_core::Dac::new(&spec.rig.dac.converter).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
     let holds = if plan.bounds.actuator == ActuatorKind::Motor {
-        // Whatever its safe state: nothing watches it yet.
+        // Its safe state does not matter: nothing watches it yet.
         plan.bounds.left_over(volts) <= 0.0
     } else {
         scenario.safety().is_ok_and(|s| match s.on_fault.holding_voltage() {

@@ -1,7 +1,7 @@
 //! A view of a run while it goes on.
 //!
-//! Whoever runs a loop copies its records into a ring, and does nothing else for those who look on: a view that is slow
-//! misses records, and the loop does not notice.
+//! The thread that runs a loop copies its records into a ring, and does nothing else for those who look on: a view that is
+//! slow misses records, and the loop does not notice.
 
 use crate::live_gains::LiveGains;
 use crate::log_thread::Ring;

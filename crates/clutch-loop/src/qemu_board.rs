@@ -106,7 +106,7 @@ fn alive(child: &mut Child) -> Result<(), QemuError> {
     let Some(status) = child.try_wait().map_err(system("looked at"))? else { return Ok(()) };
     let mut said = String::new();
     if let Some(mut stderr) = child.stderr.take() {
-        let _ = stderr.read_to_string(&mut said); // the status alone tells, too
+        let _ = stderr.read_to_string(&mut said); // the status alone says enough, too
     }
     Err(QemuError::Ended { status: status.to_string(), said: said.trim().to_owned() })
 }

@@ -119,7 +119,7 @@ impl ReleaseTest {
         let tells = self.tells()?;
         let list = |lies: &[&str]| if lies.is_empty() { "nothing".to_owned() } else { lies.join(", ") };
         Ok(format!(
-            "0 V for {} periods, at most {:.2}°: tells {}; cannot tell {}",
+            "0 V for {} periods, at most {:.2}°: finds {}; cannot find {}",
             self.periods,
             self.longest_way.to_degrees(),
             list(&tells.told),

@@ -533,7 +533,7 @@ impl Course<'_> {
 
     /// The verdict of a release test.
     fn passed(&self, report: &LoopReport) -> Result<(), SessionError> {
-        // Whoever stops it, stops the run as well.
+        // A stop of the test stops the run as well.
         if report.cause == Cause::Done || self.stop.load(Ordering::Relaxed) {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! ControlLaw, line and simulated board in virtual time: what the fault campaign runs.
+//! Controller, line and simulated board in virtual time: the runs of the fault campaign.
 //!
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
@@ -234,7 +234,7 @@ impl VirtualBoard for SimBoard {
     }
 }
 
-/// ControlLaw, line and board.
+/// Controller, line and board.
 pub struct VirtualLoop<S, B = SimBoard> {
     board: B,
     station: S,

@@ -1,4 +1,4 @@
-//! Words for what a board refuses, and for what ends control.
+//! Words for the refusals of a board, and for the causes that end control.
 
 use clutch_core::supervisor::Cause;
 use clutch_settings::{Refusing, Settings};
@@ -43,10 +43,10 @@ pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> St
             "the board has not heard this machine for too long, and has ended the run".into()
         }
         Cause::Operator => "stopped by the operator".into(),
-        Cause::Lost => format!("{v} samples lost within 128 cycles"),
+        Cause::Lost => format!("{v} samples lost within 128 periods"),
         Cause::Late => "too many samples or answers came late".into(),
-        Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
-        Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
+        Cause::Duplicated => format!("{v} samples came twice within 128 periods"),
+        Cause::Reordered => format!("{v} samples came out of order within 128 periods"),
         Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
         Cause::StandStill => envelope("the encoder shows no movement: encoder frozen, or shaft blocked"),
         Cause::Channel => envelope("the counts go to and fro: a channel of the encoder is dead, or loose"),
@@ -63,7 +63,7 @@ pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> St
         Cause::Saturation => "the voltage was at its limit for too long".into(),
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
-        // The board's own supervisor tells for how many periods.
+        // The board's own supervisor reports the number of periods.
         Cause::Clock => format!(
             "the board's clock and its periods, or this machine's clock, are apart by {} ms: a wrong prescaler or crystal",
             number(v / 1000.0)

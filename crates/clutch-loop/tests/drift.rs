@@ -1,4 +1,4 @@
-//! The watch over friction and load: what leaves the bounds is told on its side and in time, what does not leave them is not.
+//! The watch over friction and load: what leaves the bounds is reported on its side and in time, what does not leave them is not.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use clutch_core::{Bounds, Interval};
@@ -157,7 +157,7 @@ fn a_shaft_that_stands_tells_nothing() {
     let still = [("reference", "{ hold = {} }")];
     let (alarms, report) = run(&built_in("board_smc_2", &still), &["dac-scale:at=2,factor=1.5"]);
     assert!(alarms.is_empty() && report.windows == 0 && report.last.is_none());
-    assert_eq!(report.words(), "not told: too little motion without a stand");
+    assert_eq!(report.words(), "not determined: too little motion without a stand");
     assert_eq!(report.to_json()["last"], serde_json::Value::Null);
 }
 
@@ -183,7 +183,7 @@ fn a_motor_axis_is_watched_both_ways_and_one_without_friction_says_so() {
     let free = [("model.actuator.motor.preload_nm", "0.0"), ("rig.actuator.motor.preload_nm", "0.0")];
     let (alarms, report) = run(&built_in("motor_pid", &free), &[]);
     assert!(alarms.is_empty() && report.last.is_none());
-    assert_eq!(report.words(), "not told: the model has no friction");
+    assert_eq!(report.words(), "not determined: the model has no friction");
 }
 
 #[test]

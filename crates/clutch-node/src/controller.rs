@@ -353,7 +353,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 self.send_stop(reason, out);
             }
         }
-        // Whoever is told of the cycle takes his time, and the next period waits for what is known of it.
+        // The receiver of the notice takes time, and the next period needs what is computed here: that comes first.
         self.supervisor.expect(&mut self.state, &from_here());
         self.count(cycle.arrival);
         notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));

@@ -5,7 +5,7 @@
 //! answer  = poll_at_ns u64 (all ones: none) · 0 u32 · host u16 · daq u16 · bytes of both
 //! ```
 //!
-//! All little-endian. Whoever sends a request decides how long it is until the next, so that a run is
+//! All little-endian. The sender of a request decides the time until the next, so that a run is
 //! the same however fast the machine is.
 
 use crate::board_controller::BoardController;

@@ -115,7 +115,7 @@ pub(crate) fn identify<'py>(
     Ok((object, file, why))
 }
 
-/// Key, name for readers, unit and the factor from SI to it, of each parameter that identification may tell, in the order in
+/// Key, name for readers, unit and the factor from SI to it, of each parameter that identification may determine, in the order in
 /// which they are shown.
 #[pyfunction]
 pub(crate) fn identified_rows() -> Vec<(&'static str, &'static str, &'static str, f64)> {

@@ -27,7 +27,7 @@ const HELD_OUT: std::ops::Range<i64> = 3001..3011;
 /// Length of a run and its settling time, s.
 const LENGTH: (f64, f64) = (9.0, 1.0);
 
-/// Laws that follow a path, as readers are told them, and their part of a scenario.
+/// Laws that follow a path, by their names for readers, and their part of a scenario.
 const LAWS: &[(&str, &str)] = &[
     ("PD", "[law.pd]"),
     ("CTC", "[law.ctc]"),

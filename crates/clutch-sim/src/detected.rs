@@ -54,7 +54,7 @@ impl Detected {
             let [least, most] = self.bounds();
             format!(
                 "counts and voltage leave {} to {} cycles/s: gaps between two edges last long enough for a stick \
-                 unseen, and the voltage falls far enough in them; a finer encoder, or another rate, tells more",
+                 unseen, and the voltage falls far enough in them; a finer encoder, or another rate, shows more",
                 number(least),
                 number(most)
             )

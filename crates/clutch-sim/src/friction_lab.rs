@@ -72,7 +72,7 @@ pub fn examine(params: &FrictionParams) -> Result<Lab, LabError> {
     let pre_sliding = probe.pre_sliding(deflection, slow);
     probe.bend = bristles.map_or(Bend::none(), |b| b.steady(slow));
     let lag = probe.lag(slow, deflection);
-    // Faster ones tell more of the inertia than of the friction.
+    // Faster ones show more of the inertia than of the friction.
     let rates = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1];
     let break_away =
         rates.iter().map(|rate| Ok((*rate, break_away(&model, *rate)?))).collect::<Result<_, LabError>>()?;

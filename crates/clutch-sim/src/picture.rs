@@ -1,7 +1,7 @@
 //! A run as a picture shows it: closely around one stick, and the whole as an envelope.
 //!
 //! Ten seconds of a shaft that sticks twenty times a second are a solid band if they are drawn as a line. A [`Window`] is
-//! short enough to tell one stair from the next; an [`Envelope`] shows how far the whole goes, and its mean.
+//! short enough to distinguish one stair from the next; an [`Envelope`] shows how far the whole goes, and its mean.
 
 use crate::engine::{Event, EventKind};
 use crate::run::{Run, Trace};

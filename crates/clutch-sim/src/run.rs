@@ -237,7 +237,7 @@ pub enum RunError {
     /// There is no room for so many samples.
     #[error("no memory for {0} samples, of about 130 bytes each; make the run shorter, or keep figures only")]
     Memory(u64),
-    /// Whoever watched the progress ended it.
+    /// The watcher of the progress ended it.
     #[error("stopped before its end")]
     Stopped,
 }

@@ -81,8 +81,8 @@ const RING: usize = 1024;
 pub const CLOCK_HZ: u32 = 170_000_000;
 
 /// The clock that the library is told of, and leaves the core with: half of it. The maker wants a microsecond there on the
-/// way from below 80 MHz to above, which the library does not give: [`full_speed`] does. What the library computes from
-/// it, for the timer of its time, for the line and for the converter, is set right by hand.
+/// way from below 80 MHz to above, which the library does not give: [`full_speed`] does. The library's results from
+/// it, for the timer of its time, for the line and for the converter, are set right by hand.
 const LIBRARY_HZ: u32 = CLOCK_HZ / 2;
 
 /// Level of the supply below which the chip is to be in reset, by its option bytes: 2.8 V.
@@ -342,7 +342,7 @@ impl Line {
         Line { ring, at: 0 }
     }
 
-    /// Waits for bytes, and moves as many as there are, and fit, to `bytes`; their number. Whoever is more than the
+    /// Waits for bytes, and moves as many as there are, and fit, to `bytes`; their number. A reader that is more than the
     /// ring behind gets later ones in their place; the checksums of the frames show it.
     pub async fn read(&mut self, bytes: &mut [u8]) -> usize {
         poll_fn(|context| {

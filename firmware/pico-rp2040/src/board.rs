@@ -161,7 +161,7 @@ fn start_clocks() {
 }
 
 /// The reason why the program starts. A reset by the watchdog may have a reason that [`stop`] has noted, in a register
-/// that outlives it. What reset the chip as a whole is known until the next such reset, so the watchdog comes first.
+/// that outlives it. The cause of a reset of the whole chip is kept until the next such reset, so the watchdog comes first.
 fn started_by() -> ResetCause {
     let (watchdog, chip) = (pac::WATCHDOG.reason().read(), pac::VREG_AND_CHIP_RESET.chip_reset().read());
     let note = pac::WATCHDOG.scratch0().read();

@@ -188,8 +188,8 @@ fn table(bold: bool) -> Tried {
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// The answer of a decoder to a frame with a right checksum: nothing, or the one message that is encoded so. Every kind with
-/// every content of up to two bytes; and every stream of three bytes, after which the next frame is heard.
+/// Decoding a frame with a right checksum yields nothing, or the one message that is encoded so. Every kind with every
+/// content of up to two bytes; and every stream of three bytes, after which the next frame is heard.
 fn frames(bold: bool) -> Tried {
     let good = encode(&Message::Ping(Ping { run: 0x00FF, nonce: 0x0100_0000 }));
     let heard = |decoder: &mut Decoder, bytes: &[u8]| bytes.iter().filter_map(|b| decoder.push(*b)).last();

@@ -123,7 +123,7 @@ class Case:
     text
         Contents of a case file.
     origin
-        What errors begin with.
+        The beginning of error messages.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
     cases, results = list(cases), []
     for what, names in (("case", [c.id for c in cases]), ("engine", [e.name for e in engines])):
         if twice := next((name for i, name in enumerate(names) if name in names[:i]), None):
-            raise ValueError(f"{what} {twice}: given twice; a table tells them by their names")
+            raise ValueError(f"{what} {twice}: given twice; a table distinguishes them by their names")
     for case in cases:
         for engine in engines:
             if (why := engine.missing() or engine.refuses(case)) is not None:

@@ -31,14 +31,14 @@ const SKIPPED_WITHOUT_TARGETS: u64 =
 const WORKSPACE: [&str; 3] =
     ["--workspace", "--features", "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope"];
 
-/// What is tested: all that says so in its manifest. Examples that no test runs are left to `check`, which compiles them,
+/// The targets tested: all that say so in their manifest. Examples that no test runs are left to `check`, which compiles them,
 /// too, and does not link each with the whole house.
 const TESTS: &str = "--tests";
 
 /// Runs everything, counts, and fails at the end if anything failed; `more` are options of what runs beside it, [`boards`].
 pub(crate) fn all(more: &[&str]) -> Result<()> {
     let mut tally = Tally::new();
-    // What has to come from elsewhere comes while processors build.
+    // Downloads come while processors build.
     let (built, tools) = std::thread::scope(|scope| {
         let needs = scope.spawn(needs);
         let built = build(&mut tally)?;
@@ -364,7 +364,7 @@ fn libraries(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// What fuzzing beside the tests is watched for; `cargo xtask fuzz` watches the memory, too.
+/// The defects for which fuzzing beside the tests is watched; `cargo xtask fuzz` watches the memory, too.
 const WATCHED: fuzz::Watched = fuzz::Watched::Panics;
 
 /// Each reader of bytes from outside.

@@ -251,7 +251,7 @@ impl<T: Real> Belief<T> {
     }
 
     /// The position was measured, with a variance: what it was off by, squared, and the variance of that. However far it is
-    /// off, the belief is not widened: what a shaft that runs away does between two edges tells its friction.
+    /// off, the belief is not widened: what a shaft that runs away does between two edges shows its friction.
     #[inline(never)]
     pub(super) fn correct(&mut self, measured: T, variance: T) -> Surprise<T> {
         let y = measured - self.motion.position;

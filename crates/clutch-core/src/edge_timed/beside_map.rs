@@ -124,7 +124,7 @@ impl<T: Real> BesideMap<T> {
         target_velocity: T,
     ) {
         self.plain.start_in(&mut state.plain, position, applied, target_velocity);
-        // What is of the map is written when that begins.
+        // The fields of the map are written when that begins.
         (state.place, state.part) = (Place::default(), T::splat(NONE));
     }
 

@@ -107,7 +107,7 @@ pub struct EdgeTimed<T> {
     blur: T,
 }
 
-/// What a brake does to the shaft, counts per period²: the pull of the drive, and the load of the pad per volt and
+/// Effect of a brake on the shaft, counts per period²: the pull of the drive, and the load of the pad per volt and
 /// without one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Brake<T> {
@@ -133,7 +133,7 @@ enum Phase {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EdgeTimedState<T> {
     belief: Belief<T>,
-    /// What was believed of friction at the last edge.
+    /// Friction as believed at the last edge.
     at_edge: Friction<T>,
     /// Whole counts of the last sample; of a brake's shaft, before a single count back.
     counts: i64,

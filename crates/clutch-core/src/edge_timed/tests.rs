@@ -120,7 +120,7 @@ fn counts_that_it_was_to_gain_on_the_path_shorten_the_silence() {
     };
     // The path goes 0.111 counts in a period, and it was to gain 0.1 on that in each since, of which one had none.
     assert_eq!((silence(0.0), silence(0.1)), (28, 16));
-    // What it gained up to an edge is forgotten there.
+    // Its gain up to an edge is forgotten there.
     let mut moved = state;
     f.update_on(&mut moved, at, 2.2, (rate, 2.9), None);
     f.update_on(&mut moved, FixedCounts::from_counts(state.counts + 1), 2.2, (rate, 0.0), None);

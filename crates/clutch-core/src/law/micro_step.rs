@@ -213,7 +213,7 @@ impl<T: Real> MicroStep<T> {
     /// Decides whether a step begins, with the path `error` counts ahead.
     fn decide(&self, state: &mut MicroStepState<T>, error: T, pace: T) {
         let way = if error < T::ZERO { -T::ONE } else { T::ONE };
-        // The way of a step tells how long it takes to stop; a place with less friction has a whole period.
+        // The way of a step shows how long it takes to stop; a place with less friction has a whole period.
         let ratio = (state.scale * (T::ONE + self.ratio) - T::ONE).max(T::ONE).max(self.ratio);
         let k = self.way * state.scale;
         // The least m for which m² k in m (1 + ratio) periods and the delay is as fast as the path.

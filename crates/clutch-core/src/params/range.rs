@@ -164,7 +164,7 @@ impl fmt::Display for Words {
     }
 }
 
-/// A number whose digits are told apart in threes, if it is a long whole one.
+/// A number whose digits are grouped in threes, if it is a long whole one.
 struct Grouped(f64);
 
 impl fmt::Display for Grouped {

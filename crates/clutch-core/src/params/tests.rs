@@ -137,7 +137,7 @@ fn a_parameter_that_may_be_absent_is_there_when_it_is_asked_for() {
     assert_eq!(kinds.cast::<f32>().absent, Some(1.5_f32));
     kinds.edit(&mut Seen { present: Some(false), ..Seen::default() });
     assert_eq!(kinds.absent, None);
-    // Numbers as errors and tables tell them.
+    // Numbers as errors and tables show them.
     let numbers = [Leaf::<f64>::number(&Some(2.5)), Leaf::<f64>::number(&None::<f64>)];
     assert_eq!(numbers, [2.5, 0.0]);
     assert_eq!((Leaf::<f64>::number(&true), Leaf::<f64>::number(&ActuatorKind::Motor)), (1.0, 1.0));

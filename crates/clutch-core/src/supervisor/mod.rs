@@ -200,8 +200,8 @@ impl<T: Real> Supervisor<T> {
         cycle
     }
 
-    /// Computes what the next sample will most likely be judged by, so that its answer comes sooner. Whoever does not call
-    /// it gets the same answers later.
+    /// Computes what the next sample will most likely be judged by, so that its answer comes sooner. Without this call
+    /// the answers are the same, and come later.
     pub fn expect<S>(&self, s: &mut SupervisorState<T, S>, planned: &impl Planned<T>) {
         if s.state == State::Running {
             let tick = s.tick.wrapping_add(1);

@@ -35,7 +35,7 @@ impl Default for Programme {
 /// Least and most that the limits may be: a ride at 5 °/s needs 8° to be even, and C/K a rate well above that.
 const TRAVELS_DEG: (f64, f64) = (10.0, 3600.0);
 const FASTEST_DEG_S: (f64, f64) = (15.0, 3600.0);
-/// Rate of the crawl, °/s, its way, °, and where it begins: within the rides, which tell friction there.
+/// Rate of the crawl, °/s, its way, °, and where it begins: within the rides, which show friction there.
 const CRAWL_DEG_S: f64 = 0.5;
 const CRAWL_DEG: f64 = 5.0;
 const CRAWL_FROM_DEG: f64 = 2.0;
@@ -50,7 +50,7 @@ const HOP_VOLTS: f64 = 2.0;
 const HOP_SPEED: f64 = 0.7;
 const HOP_RISE_S: f64 = 0.01;
 const HOP_PACE_S: f64 = 0.25;
-/// Share of the output's span that a hop may take: a law at a limit tells nothing.
+/// Share of the output's span that a hop may take: a law at a limit shows nothing.
 const MOST_VOLTS: f64 = 0.6;
 /// Bandwidth of the PID of the rides, rad/s.
 const BANDWIDTH: f64 = 60.0;

@@ -38,7 +38,7 @@ pub struct Hop {
     backwards: bool,
 }
 
-/// Friction as known, V, and the rest that a hop does not tell.
+/// Friction as known, V, and the rest that a hop does not show.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// Mean friction and its deviation, either way: forwards, backwards.
@@ -136,7 +136,7 @@ fn density(hops: &[Hop], known: &Known, pull: f64, delay: f64) -> f64 {
     each.sum::<f64>() / OVERRATED
 }
 
-/// K/J and the delay (s) that the hops tell; none without hops, or where these bound one of them on one side alone.
+/// K/J and the delay (s) that the hops determine; none without hops, or where these bound one of them on one side alone.
 #[must_use]
 pub fn estimate(hops: &[Hop], known: &Known) -> Option<(Estimate, Estimate)> {
     let period = hops.first()?.recording.period;

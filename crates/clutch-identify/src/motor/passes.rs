@@ -4,7 +4,7 @@ use crate::recording::Recording;
 use crate::ride::{Place, Told, WAVES_PER_TURN, rides};
 use nalgebra::{SMatrix, SVector};
 
-/// Share of the longest way that a pass has to go to tell friction along the way.
+/// Share of the longest way that a pass has to go to show friction along the way.
 const LONG: f64 = 0.8;
 /// Share of a stretch that a map has to cover, and the part of the ripple's rest that is left where it does.
 const COVERED: f64 = 0.7;
@@ -13,14 +13,14 @@ const MAPPED: f64 = 0.7;
 pub(crate) const FINEST: f64 = 0.03;
 /// Time over which a velocity is taken, s: in less a sample is a large part of it.
 const WINDOW_S: f64 = 0.01;
-/// Deviation of friction at rest where no break-away tells it, as a share.
+/// Deviation of friction at rest where no break-away determines it, as a share.
 const UNKNOWN: f64 = 1.0;
 /// Share of its rate that an even pass has everywhere, below a rate, rad/s, above which Stribeck's fall is done.
 const EVEN: f64 = 0.5;
 const SLOW: f64 = 0.06;
 /// Share by which rates are the same.
 const ALIKE: f64 = 0.1;
-/// Rates that tell a slope lie this far apart, rad/s.
+/// Rates that determine a slope lie this far apart, rad/s.
 const RATES_APART: f64 = 0.15;
 /// The rest of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
 const LEFT_OVER: f64 = 2.0;
@@ -44,7 +44,7 @@ pub fn passes(views: &[Vec<Recording>; 2], pull: f64, delay: f64) -> Vec<Pass> {
     let mut found = Vec::new();
     for (way, view) in views.iter().enumerate() {
         let mut rides: Vec<_> = view.iter().flat_map(rides).collect();
-        // The longest way first, of these the slowest: it tells the ripple.
+        // The longest way first, of these the slowest: it shows the ripple.
         let length = |r: &crate::ride::Ride<'_>| {
             r.recording.ticks[r.ticks.1].counts - r.recording.ticks[r.ticks.0].counts
         };
@@ -79,13 +79,13 @@ fn velocities(r: &Recording, (begin, end): (usize, usize)) -> Vec<f64> {
         .collect()
 }
 
-/// The pass that tells friction along the way: the first one, as they are sorted.
+/// The pass that shows friction along the way: the first one, as they are sorted.
 #[must_use]
 pub fn reference(passes: &[Pass], way: usize) -> Option<&Pass> {
     passes.iter().find(|p| p.way == way)
 }
 
-/// The place-by-place friction over its mean that the slowest pass over a place tells, which sees it best; the mean is that of
+/// The place-by-place friction over its mean that the slowest pass over a place shows, which sees it best; the mean is that of
 /// the reference.
 #[must_use]
 pub fn finest(passes: &[Pass], way: usize) -> Vec<Place> {
@@ -170,7 +170,7 @@ impl Curve {
         for pass in passes.iter().filter(|p| p.is_even()) {
             let map = &reference(passes, pass.way)?.told.map;
             let (volts, deviation) = pass.friction(map);
-            // Passes at one rate go over the same places: together they tell no more than one.
+            // Passes at one rate go over the same places: together they show no more than one.
             let alike = |p: &&Pass| p.way == pass.way && (p.told.rate / pass.told.rate - 1.0).abs() < ALIKE;
             let deviation = deviation * (passes.iter().filter(alike).count() as f64).sqrt();
             let left = pass.left(velocity);
@@ -201,7 +201,7 @@ impl Curve {
         let value = spread * right;
         let off = rows.iter().map(|(row, volts, deviation)| (volts - row.dot(&value)) / deviation);
         let misfit: f64 = off.map(|x| x * x).sum();
-        // Passes that scatter more than they say tell less.
+        // Passes that scatter more than they say count less.
         let freedom = rows.len().saturating_sub(6).max(1) as f64;
         spread *= (misfit / freedom).max(1.0);
         Some(Curve { value, spread, misfit, freedom })
@@ -214,7 +214,7 @@ impl Curve {
     }
 }
 
-/// Friction along the way over its mean: of both ways, the mean where both tell it.
+/// Friction along the way over its mean: of both ways, the mean where both show it.
 #[must_use]
 pub fn map(passes: &[Pass]) -> Vec<Place> {
     let forwards = reference(passes, 0).map(|p| p.told.map.clone()).unwrap_or_default();

@@ -67,7 +67,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     });
     let mut told = Motion { views, slips, passes: Vec::new(), pull: None, delay: None };
     let mut known = hops::guessed(recordings);
-    // Friction tells K/J more closely, and that friction.
+    // Friction determines K/J more closely, and that friction.
     for _ in 0..2 {
         let Some((pull, delay)) = hops::estimate(&all, &known) else { break };
         told.passes = passes::passes(&told.views, pull.value, delay.value);
@@ -110,7 +110,7 @@ impl Motion {
         (n > 0.0).then(|| (sum.0 / n, sum.1 / n))
     }
 
-    /// Friction at rest one way, V, and its deviation, from break-aways where a map tells what friction there is to its mean.
+    /// Friction at rest one way, V, and its deviation, from break-aways where a map gives the friction there over its mean.
     fn at_rest(&self, way: usize, sliding: [f64; 2]) -> Option<(f64, f64)> {
         let (pull, delay) = (self.pull?.value, self.delay?.value);
         let map = passes::finest(&self.passes, way);
@@ -136,7 +136,7 @@ impl Motion {
     }
 
     fn report(self, hops: usize) -> Report {
-        let even = "even rates both ways, as 5 and 60 °/s to and fro over 20°, and hops for J/K tell it";
+        let even = "even rates both ways, as 5 and 60 °/s to and fro over 20°, and hops for J/K determine it";
         let first = Curve::through(&self.passes, [None; 2], 0.0);
         let rest = first
             .as_ref()
@@ -149,16 +149,16 @@ impl Motion {
         let at_rest = |way: usize| match (&fitted, rest[way]) {
             (Some(_), Some(_)) => of(2 + way, place),
             _ => Finding::Refused(format!(
-                "{} break-aways {} where rides tell friction, of the {FEWEST_SLIPS} that it takes: a crawl at 0.5 °/s \
-                 to and fro under a soft law tells it",
+                "{} break-aways {} where rides show friction, of the {FEWEST_SLIPS} that it takes: a crawl at 0.5 °/s \
+                 to and fro under a soft law determines it",
                 self.slips[way].len(),
                 ["forwards", "backwards"][way]
             )),
         };
         let hop = if hops == 0 {
-            "no hop: from rest a sudden voltage for some 30 ms tells it"
+            "no hop: from rest a sudden voltage for some 30 ms determines it"
         } else {
-            "the hops do not bound it: rides at even rates both ways, which tell friction, beside more of them do"
+            "the hops do not bound it: rides at even rates both ways, which show friction, beside more of them do"
         };
         let or_hop = |e: Option<Estimate>| e.map_or_else(|| refused(hop), Finding::Known);
         let inverse = |e: Estimate| Estimate { value: 1.0 / e.value, low: 1.0 / e.high, high: 1.0 / e.low };
@@ -169,7 +169,7 @@ impl Motion {
             sliding: [of(0, place), of(1, place)],
             load: fitted.as_ref().map_or_else(|| refused(even), |f| Finding::Known(f.load(place))),
             viscous: fitted.as_ref().map_or_else(
-                || refused("rates too close together: 60 °/s beside 5 °/s tell it"),
+                || refused("rates too close together: 60 °/s beside 5 °/s determine it"),
                 Fitted::viscous,
             ),
             stribeck: fitted.as_ref().map_or_else(|| refused(even), |f| f.stribeck.clone()),
@@ -183,10 +183,10 @@ impl Motion {
                 },
             ),
             lag: refused(
-                "the delay holds dead time and lag together: steps of a finer encoder tell them apart",
+                "the delay holds dead time and lag together: steps of a finer encoder separate the two",
             ),
             each: refused(
-                "no counts and volts tell them, as all of them scaled alike move alike; a known torque at the shaft – a mass on a \
+                "counts and volts do not determine them, as all of them scaled alike move alike; a known torque at the shaft – a mass on a \
                  lever – or a known inertia added does",
             ),
             map: passes::map(&self.passes),
@@ -234,7 +234,7 @@ impl Fitted {
             }),
             _ => refused(
                 "friction at the slowest even rate is that of the fast ones, or break-aways are missing: even rides at 1 °/s and \
-                 below tell it",
+                 below determine it",
             ),
         };
         Some(Fitted { best, likely, stribeck })

@@ -11,7 +11,7 @@ use toml::{Table, Value};
 /// Normal force of a model that has none, as torque per unit of μ, N m: only its product with μ matters.
 const PRELOAD_NM: f64 = 0.25;
 
-/// The file. Torque per volt and normal force are those of the scenario's model: counts and volts tell the other parameters as
+/// The file. Torque per volt and normal force are those of the scenario's model: counts and volts give the other parameters as
 /// ratios to the first, and μ only with the second.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let actuator = Actuator::new(&scenario.spec().model.actuator).ok();
     let gain = actuator.map_or(0.0, |a| a.motor_gain());
     let preload = actuator.map(|a| a.preload()).filter(|n| *n > 0.0).unwrap_or(PRELOAD_NM);
-    // What a load takes one way it gives the other.
+    // A load gives one way the torque that it takes the other.
     let mean = |of: [Estimate; 2]| {
         let [value, low, high] = [|e: Estimate| e.value, |e: Estimate| e.low, |e: Estimate| e.high]
             .map(|get| 0.5 * (get(of[0]) + get(of[1])));
@@ -83,9 +83,9 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
         ("identified".to_owned(), Value::Table(intervals(&MOTOR_ROWS, report))),
     ]);
     Ok(format!(
-        "# What `clutch identify` found for: {}\n\
+        "# Findings of `clutch identify` for: {}\n\
          # For `clutch certify`, `clutch loop` and `clutch sim`: --identified THIS_FILE.toml puts [model] and [bounds] into a\n\
-         # scenario. Torque per volt and normal force are the scenario's own: only ratios to them can be told, and matter.\n\n{file}",
+         # scenario. Torque per volt and normal force are the scenario's own: only ratios to them can be determined, and matter.\n\n{file}",
         scenario.name().replace(['\n', '\r'], " ")
     ))
 }

@@ -1,6 +1,6 @@
-//! Break-aways of a motor axis under a voltage that rises slowly, and the friction at rest that they tell.
+//! Break-aways of a motor axis under a voltage that rises slowly, and the friction at rest that they show.
 //!
-//! A break-away tells friction at rest where the shaft stood, and rides tell how friction there is to its mean: their quotient does
+//! A break-away shows friction at rest where the shaft stood, and rides its ratio to the mean there: their quotient does
 //! not depend on the place.
 
 use crate::recording::Recording;

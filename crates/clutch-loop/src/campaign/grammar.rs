@@ -253,7 +253,7 @@ impl Draw {
                 _ => {}
             }
         }
-        // A load that is to be told by the voltage's limit: the law that goes there, and no other trouble.
+        // A load that the voltage's limit is to show: the law that goes there, and no other trouble.
         if let Some(load) = troubles.iter().find(|t| matches!(t.what, What::Load(_))).copied() {
             setting.rig = RigName::Paper;
             setting.law = laws::TO_ITS_LIMIT;

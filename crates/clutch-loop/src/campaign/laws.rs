@@ -28,11 +28,11 @@ pub(super) struct OfLaw {
     pub(super) starts_late: bool,
     /// True if its integral waits: at the start, and on a path slower than 10 °/s.
     pub(super) waits: bool,
-    /// True if its voltage is too far off for an encoder's fault to be told by what the slowest shaft does.
+    /// True if its voltage is too far off for an encoder's fault to show by what the slowest shaft does.
     pub(super) far_off: bool,
     /// Time for which it may leave the brake open because it waits for edges, s.
     pub(super) silence_s: f64,
-    /// Time in which a shaft that no longer tells its way ends control, s.
+    /// Time in which a shaft that no longer shows its way ends control, s.
     pub(super) found_s: f64,
     /// True if it switches between the limits of the output, and so leaves a brake open until the shaft has caught up.
     pub(super) switches: bool,

@@ -55,7 +55,7 @@ fn borne(s: &Setting, way: Direction) -> u32 {
     let patient = (s.cycles - 2).min(steady(s).unwrap_or(3));
     match way {
         Direction::Up => patient,
-        // The controller does not hear of codes that are lost: of more than one the shaft tells, and that may be too much.
+        // The controller does not hear of codes that are lost: more than one show by the shaft, and that may be too much.
         Direction::Down => 1_u32.min(patient),
         Direction::Both => u32::from(patient > 1),
     }
@@ -428,7 +428,7 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         let begun = if alone && hits(trouble) { o.hit } else { Some(trouble.at) };
         // It was never there.
         let Some(begun) = begun else { continue };
-        // Whoever plays old samples back keeps a line from being silent.
+        // Old samples that are played back keep a line from being silent.
         let played_back = |t: &Trouble| matches!(t.what, What::Fault(FaultKind::Forged(Forgery::Echo(_)), _));
         if !alone && trouble.what != What::ControllerDies && draw.troubles.iter().any(played_back) {
             continue;

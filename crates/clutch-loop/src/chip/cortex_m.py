@@ -705,7 +705,7 @@ def symbols(image: bytes) -> list[tuple[bytes, int]]:
 
 
 class Meter(ABC):
-    """Counts instructions, and estimates their cycles. What an instruction costs, and a wait for the flash, is the
+    """Counts instructions, and estimates their cycles. The cost of an instruction, and of a wait for the flash, is the
     chip's own."""
 
     CLOCK_MHZ: ClassVar[int]

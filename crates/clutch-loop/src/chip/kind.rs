@@ -42,7 +42,7 @@ impl ChipKind {
     }
 
     /// True if it can have a fault: an RP2040 has no monitor of its supply and no such options, and only its encoder's
-    /// counter tells of edges that it missed. Its images have no panic handler: with a path to a panic they would not link.
+    /// counter reports edges that it missed. Its images have no panic handler: with a path to a panic they would not link.
     #[must_use]
     pub const fn has(self, fault: ChipFaultKind) -> bool {
         match fault {

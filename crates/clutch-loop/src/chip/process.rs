@@ -235,7 +235,7 @@ impl Chip {
         let _ = self.child.kill(); // it has closed a line, so that nothing more is to come of it
         let mut said = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
-            let _ = stderr.read_to_string(&mut said); // the status alone tells, too
+            let _ = stderr.read_to_string(&mut said); // the status alone says enough, too
         }
         let status = match self.child.wait() {
             Ok(status) => status.to_string(),

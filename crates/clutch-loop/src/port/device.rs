@@ -110,7 +110,7 @@ pub(super) fn tight_line(baud: u32, bytes: (usize, usize), period: Duration) -> 
     })
 }
 
-/// The facts that `/sys` tells of a device file.
+/// The facts that `/sys` gives of a device file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Found {
     pub(super) kind: DeviceKind,
@@ -192,7 +192,7 @@ pub(super) fn classify(sys: &Path, major: u32, minor: u32) -> Result<Found, NotS
 }
 
 impl Found {
-    /// Time for which the adapter holds received bytes, ms, where its driver tells (FTDI).
+    /// Time for which the adapter holds received bytes, ms, where its driver reports it (FTDI).
     pub(super) fn latency_timer_ms(&self) -> Option<u32> {
         line(&self.folder.join("device/latency_timer"))?.parse().ok()
     }

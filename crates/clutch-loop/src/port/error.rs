@@ -14,7 +14,7 @@ use std::time::Duration;
 pub struct Holder {
     /// Its process number.
     pub pid: u32,
-    /// Its name, as far as the system tells.
+    /// Its name, as far as the system gives it.
     pub name: Option<String>,
 }
 
@@ -155,7 +155,7 @@ impl PortError {
                 let advice = permission_advice(&path, Path::new("/etc/group"));
                 PortError::PermissionDenied { path, advice }
             }
-            // The exclusive mark of somebody who does not lock: who, the kernel does not tell.
+            // The exclusive mark of somebody who does not lock: the kernel does not say who.
             Errno::BUSY => PortError::Busy { address: address.clone(), holder: None },
             Errno::NOTTY | Errno::ISDIR | Errno::INVAL => {
                 PortError::NotASerialDevice { path, why: "it takes no line settings".to_owned() }

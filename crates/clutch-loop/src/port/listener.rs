@@ -68,8 +68,8 @@ impl Listener {
         Listener::bind_remote(address)
     }
 
-    /// Listens on any address. Whoever reaches it controls the board: nobody has to prove who
-    /// they are. Only for a network of your own.
+    /// Listens on any address. Anyone who reaches it controls the board: nobody has to prove who
+    /// they are. Use it only on a network of your own.
     ///
     /// # Errors
     /// [`PortError::CannotListen`].

@@ -367,7 +367,7 @@ pub enum ClientEvent {
 pub trait Endpoint {
     /// Notices clients that came or went, one event per call. Call it regularly, each cycle or
     /// each few milliseconds; it does not wait. A client that follows another between two calls
-    /// is not told apart: it is the protocol's greeting that begins a session.
+    /// is not distinguished: it is the protocol's greeting that begins a session.
     ///
     /// # Errors
     /// The line itself failed.

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// The board's end of a pseudo-terminal. Programs open its other end as they would a serial
 /// device.
 ///
-/// The slave is not kept open on this side: then the kernel tells exactly whether a client has it
+/// The slave is not kept open on this side: then the kernel reports exactly whether a client has it
 /// open, however it was opened and however it ended. The pseudo-terminal itself lives as long as
 /// this value. Bytes that a client wrote before it left can still be read, as on a cable: the last of
 /// them may be the command to stop. Then the line is set to raw again, and what the client has not

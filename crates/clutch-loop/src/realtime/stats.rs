@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Finest step, ns: lateness while spinning is a fraction of a microsecond.
 const LOWEST_NS: u64 = 16;
-/// Largest time told apart, ns: 10 s.
+/// Largest time that is distinguished, ns: 10 s.
 const HIGHEST_NS: u64 = 10_000_000_000;
 /// Decimal digits kept: a percentile is at most 0.1 % off.
 const DIGITS: u8 = 3;

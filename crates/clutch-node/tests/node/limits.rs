@@ -1,5 +1,5 @@
-//! Every setting of a run, as it comes over the wire: below, at and above its limits, and as no number. What is out of
-//! range is refused, and the host's words on it have key, value and unit; what is in range is taken, or a relation with
+//! Every setting of a run, as it comes over the wire: below, at and above its limits, and as no number. A value out of
+//! range is refused, and the host's words on it have key, value and unit; one in range is taken, or a relation with
 //! other settings speaks against it.
 
 use crate::desk::{PATHS, Plan, paper};
@@ -308,7 +308,7 @@ fn each_setting_is_refused_out_of_its_range_and_taken_within_it() {
         Setting::all().filter(|s| !reached.contains(&s.key)).map(|s| s.name.to_string()).collect();
     assert!(left_out.is_empty(), "no plan has {left_out:?}");
     assert_eq!(reached.len(), SETTINGS);
-    // What no plan takes at an end of its range: a relation with others is narrower there, whatever they are.
+    // Settings that no plan takes at an end of their range: a relation with others is narrower there, whatever they are.
     let related: Vec<String> = Setting::all()
         .filter(|s| {
             let good = values(s).good;

@@ -175,7 +175,7 @@ fn run(scenario: &Scenario, setup: &Setup, seconds: f64, seed: u64) -> Outcome<(
     Ok((run.metrics.max_error_rad, run.metrics.stick_slip_cycles_per_s))
 }
 
-/// Processor time of this thread, s; 0 where the system does not tell.
+/// Processor time of this thread, s; 0 where the system does not report it.
 fn cpu_seconds() -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     told.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9

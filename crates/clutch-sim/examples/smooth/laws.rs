@@ -8,7 +8,7 @@ const RATES: [f64; 9] = [100.0, 20.0, 10.0, 6.0, 4.0, 2.0, 1.5, 1.0, 0.5];
 
 /// A law.
 pub(super) struct Law {
-    /// The law as it is told to readers.
+    /// The law's name for readers.
     pub(super) title: &'static str,
     /// The same in a figure.
     short: &'static str,

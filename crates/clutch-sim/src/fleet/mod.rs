@@ -29,7 +29,7 @@ const TOGETHER: usize = 32;
 /// Shafts of a block, at most: few enough for a core's own memory.
 const BLOCK: usize = 256;
 
-/// A number that is told of a shaft at a sample.
+/// A number that is reported of a shaft at a sample.
 #[derive(Clone, Copy)]
 pub(crate) enum Quantity {
     Time,
@@ -93,7 +93,7 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Names of the quantities that are told of a shaft at a sample, with units: `sticks` so far, `stuck` is 1 at rest,
+    /// Names of the quantities that are reported of a shaft at a sample, with units: `sticks` so far, `stuck` is 1 at rest,
     /// `voltage_v` was commanded last, `law_voltage_v` is what the scenario's law answers.
     pub const QUANTITIES: [&'static str; 13] = [
         "time_s",
@@ -165,7 +165,7 @@ impl Fleet {
     /// A sampling period: each shaft moves under its voltage, V, which the converter rounds. On all processors.
     ///
     /// # Errors
-    /// A motion that the engine cannot follow. Its shaft stays where it is, and each step tells of it, until it is reset;
+    /// A motion that the engine cannot follow. Its shaft stays where it is, and each step reports it, until it is reset;
     /// the others go on.
     ///
     /// # Panics

@@ -13,7 +13,7 @@ fn scenario(name: &str, set: &[(&str, &str)]) -> Scenario {
     built_in(name, &set)
 }
 
-/// All that is told of a fleet, as bits; shaft by shaft within a quantity.
+/// All that is reported of a fleet, as bits; shaft by shaft within a quantity.
 fn told(fleet: &Fleet) -> Vec<u64> {
     let mut numbers = Vec::new();
     (0..Fleet::QUANTITIES.len()).for_each(|quantity| fleet.tell(quantity, &mut numbers));

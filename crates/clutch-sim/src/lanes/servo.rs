@@ -73,7 +73,7 @@ pub(super) struct Steered<'a> {
     pub(super) by: Steering<'a>,
 }
 
-/// How servos of one vector are computed.
+/// The way in which servos of one vector are computed.
 #[derive(Clone, Copy)]
 pub(super) enum Steering<'a> {
     /// In its lanes, with their filter (5).

@@ -310,7 +310,7 @@ type Values<'a> = &'a [(&'a str, &'a str)];
 /// Keys of which a case draws values, with their ranges.
 type Drawn<'a> = &'a [(&'a str, f64, f64)];
 
-/// How often runs alone got what the law asked for, the lowest voltage, and the highest.
+/// Numbers of ticks in which runs alone got what the law asked for, the lowest voltage, and the highest.
 fn limits(scenarios: &[Scenario]) -> [usize; 3] {
     let traces: Vec<_> = scenarios.iter().map(|s| s.run(Keep::Trace, UNWATCHED).unwrap().trace).collect();
     [Limit::None, Limit::Lowest, Limit::Highest]

@@ -1,4 +1,4 @@
-//! Demands of a case that no engine here follows: told by its key, before any other mistake of the file.
+//! Demands of a case that no engine here follows: named by its key, before any other mistake of the file.
 
 use toml::{Table, Value};
 

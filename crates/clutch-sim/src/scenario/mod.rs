@@ -706,7 +706,7 @@ impl Scenario {
         Ok(envelope)
     }
 
-    /// Runs it, keeping what is asked for and telling of its progress in samples.
+    /// Runs it, keeping what is asked for and reporting its progress in samples.
     ///
     /// # Errors
     /// A motion that cannot be followed; the end of `progress`'s patience.

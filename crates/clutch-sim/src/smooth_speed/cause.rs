@@ -122,7 +122,7 @@ impl Evidence {
         })
     }
 
-    /// The evidence with the run that failed, which is tried on an even disc if nothing else tells why it did.
+    /// The evidence with the run that failed, which is tried on an even disc if nothing else shows why it did.
     pub(super) fn with(
         mut self,
         failed: Option<&Failure>,

@@ -34,7 +34,7 @@ pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String])
     nearest(unknown, known)
 }
 
-/// What was expected, behind the probable meaning: `: did you mean kp_v? Expected one of: kp_v, kd_v_s_rad`.
+/// The expectation, behind the probable meaning: `: did you mean kp_v? Expected one of: kp_v, kd_v_s_rad`.
 #[must_use]
 pub fn expected(meaning: &str, known: &[impl AsRef<str>]) -> String {
     let begin = if meaning.ends_with('?') { " Expected" } else { "; expected" };
