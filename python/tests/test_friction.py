@@ -93,7 +93,7 @@ def test_bristles_move_as_scipy_says(friction):
         law=clutch.Voltage(start_v=2.0),
         reference=clutch.Hold(),
         rig=clutch.Rig.ideal().replace(friction=friction, drive=clutch.SineDrive(**SINE)),
-        run=clutch.RunSettings(duration_s=1.0, settle_s=0.0, start="rest", start_counts=0),
+        run=clutch.RunOptions(duration_s=1.0, settle_s=0.0, start="rest", start_counts=0),
     )
     plant = clutch.Plant(scenario)
     positions, velocities = [], []
@@ -124,6 +124,6 @@ def test_an_engine_that_cannot_take_a_friction_says_which_can():
     rig = clutch.Rig(friction=clutch.LugreFriction())
     scenario = {"law": clutch.Pd(), "reference": clutch.Ramp(rate_deg_s=2)}
     with pytest.raises(clutch.ParamError, match=r"run\.engine.*engine = bristle or auto"):
-        clutch.Scenario(**scenario, rig=rig, run=clutch.RunSettings(engine="dormand_prince"))
+        clutch.Scenario(**scenario, rig=rig, run=clutch.RunOptions(engine="dormand_prince"))
     with pytest.raises(clutch.ParamError, match=r"run\.engine.*is for friction with bristles"):
-        clutch.Scenario(**scenario, run=clutch.RunSettings(engine="bristle"))
+        clutch.Scenario(**scenario, run=clutch.RunOptions(engine="bristle"))

@@ -94,7 +94,7 @@ REQUIRED = {
     },
     clutch.Sampling: {},
     clutch.Bounds: {},
-    clutch.RunSettings: {},
+    clutch.RunOptions: {},
     clutch.HoldVoltage: {"volts_v": 4.5},
     clutch.RampVoltage: {"rate_v_s": 50.0, "volts_v": 4.5},
     clutch.Release: {},
@@ -368,7 +368,7 @@ DEPENDENT = {
         "points_deg_factor": [[], [(0.0, 1.0)], [(0.0, math.nan)], [(1.0, 1.0), (1.0, 2.0)], [(1.0,)]],
     },
     clutch.Sampling: {"scalar": ["f16", "", 64]},
-    clutch.RunSettings: {"start": ["stop", 1], "engine": ["euler", 4]},
+    clutch.RunOptions: {"start": ["stop", 1], "engine": ["euler", 4]},
     clutch.Limits: {"good_samples": [3]},
     clutch.Safety: {"reason": [3, b"why", "", " "]},
 }
@@ -467,8 +467,8 @@ def test_every_number_of_every_class_is_tried_out_of_its_range():
             "reference.sine.frequency_hz",
             500.0,
         ),
-        ({"run": clutch.RunSettings(duration_s=5, settle_s=5)}, "run.settle_s", 5.0),
-        ({"run": clutch.RunSettings(duration_s=1e5)}, "run.duration_s", 1e5),
+        ({"run": clutch.RunOptions(duration_s=5, settle_s=5)}, "run.settle_s", 5.0),
+        ({"run": clutch.RunOptions(duration_s=1e5)}, "run.duration_s", 1e5),
         ({"law": clutch.Pid(tracking_time_s=1e-4)}, "law.pid.tracking_time_s", 1e-4),
         ({"output": clutch.Output(highest_v=12)}, "output.highest_v", 12.0),
         (
@@ -491,7 +491,7 @@ def test_a_scenarios_error_has_the_dotted_key():
         ({"reference": clutch.Ramp(rate_deg_s=-2)}, "reference.ramp"),
         ({"reference": clutch.Ramp(rate_deg_s=400)}, "reference.ramp"),
         ({"rig": clutch.Rig(friction=clutch.StribeckFriction(stribeck_exponent=2)),
-          "run": clutch.RunSettings(engine="exact_flow")}, "run.engine"),
+          "run": clutch.RunOptions(engine="exact_flow")}, "run.engine"),
         ({"safety": clutch.Safety(reason="r", on_fault=clutch.HoldVoltage(volts_v=1))}, "safety.on_fault"),
     ]:  # fmt: skip
         with pytest.raises(clutch.ParamError) as caught:
@@ -787,7 +787,7 @@ VALID = {
         friction_percent=PERCENT,
         reach_rate_rad_s2=number(0, 100),
     ),
-    clutch.RunSettings: runs(),
+    clutch.RunOptions: runs(),
     clutch.HoldVoltage: each(volts_v=st.floats(0.1, 9) | st.integers(1, 9)),
     clutch.RampVoltage: each(rate_v_s=st.floats(1, 1e3), volts_v=st.floats(0.1, 9) | st.integers(1, 9)),
     clutch.Release: each(),
@@ -916,7 +916,7 @@ def test_random_scenarios_come_back_from_their_text(kp, kd, rate, percent, seed)
         law=clutch.Smc(kp_v=kp, kd_v_s_rad=kd),
         reference=clutch.Ramp(rate_deg_s=rate),
         bounds=clutch.Bounds(friction_percent=percent),
-        run=clutch.RunSettings(seed=seed),
+        run=clutch.RunOptions(seed=seed),
     )
     assert clutch.Scenario.from_toml(scenario.to_toml()) == scenario
     keys = {

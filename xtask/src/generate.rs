@@ -3,15 +3,31 @@
 use crate::run::{cargo, root};
 use anyhow::{Context, Result, bail};
 
-/// What an example prints: package and example, its arguments, the file that has it, and there the name of the markers
-/// around it.
-const PRINTED: &[(&str, &str, &[&str], &str, Option<&str>)] = &[
-    ("clutch-wire", "table", &["header"], "crates/clutch-wire/include/clutch_wire.h", None),
-    ("clutch-wire", "table", &["vectors"], "tests/wire/vectors.csv", None),
-    ("clutch-wire", "table", &["markdown"], "docs/wire.md", Some("table")),
-    ("clutch-settings", "settings", &[], "docs/wire.md", Some("settings")),
-    ("clutch-log", "channels", &[], "docs/log.md", Some("channels")),
-    ("clutch-c", "header", &[], "crates/clutch-c/include/clutch.h", None),
+/// What an example of a package prints, and the file that has it.
+struct Printed {
+    package: &'static str,
+    example: &'static str,
+    args: &'static [&'static str],
+    file: &'static str,
+    /// Name of the markers around it, where the file has more.
+    markers: Option<&'static str>,
+}
+
+const fn printed(
+    (package, example, args): (&'static str, &'static str, &'static [&'static str]),
+    file: &'static str,
+    markers: Option<&'static str>,
+) -> Printed {
+    Printed { package, example, args, file, markers }
+}
+
+const PRINTED: &[Printed] = &[
+    printed(("clutch-wire", "table", &["header"]), "crates/clutch-wire/include/clutch_wire.h", None),
+    printed(("clutch-wire", "table", &["vectors"]), "tests/wire/vectors.csv", None),
+    printed(("clutch-wire", "table", &["markdown"]), "docs/wire.md", Some("table")),
+    printed(("clutch-settings", "settings", &[]), "docs/wire.md", Some("settings")),
+    printed(("clutch-log", "channels", &[]), "docs/log.md", Some("channels")),
+    printed(("clutch-c", "header", &[]), "crates/clutch-c/include/clutch.h", None),
 ];
 
 /// Writes each file that is not what its declarations give; with `check` it fails instead.
@@ -19,7 +35,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     let of_parameters = ["run", "--package", "clutch-sim", "--example", "generate", "--"];
     cargo(of_parameters).args(check.then_some("--check")).run()?;
     let mut stale = Vec::new();
-    for (package, example, args, name, markers) in PRINTED {
+    for Printed { package, example, args, file: name, markers } in PRINTED {
         let run = ["run", "--quiet", "--package", package, "--example", example, "--"];
         let text = String::from_utf8(cargo(run).args(*args).output()?)?;
         let file = root().join(name);

@@ -1,6 +1,7 @@
 //! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
 
 mod ablate;
+mod copy;
 mod coverage;
 mod debian;
 mod dist;
@@ -17,6 +18,7 @@ mod playground;
 mod product;
 mod proof;
 mod python;
+mod rehearse;
 mod release;
 mod run;
 mod site;
@@ -235,6 +237,9 @@ enum Verb {
         #[arg(long)]
         list: bool,
     },
+    /// Adds a law's parameter, two laws, a friction model, a field of the log and a metric in a copy of the last commit, runs its
+    /// tests and uses them: a table of what had to be touched. A quarter of an hour.
+    Rehearse,
     /// Counts the lines of product code by crate. Two revisions stand side by side.
     Size {
         /// Revisions of git.
@@ -328,6 +333,7 @@ fn main() -> Result<()> {
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Notebooks => notebooks(),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
+        Verb::Rehearse => rehearse::run(),
         Verb::Size { revisions } => size::print(&revisions),
         Verb::Generate { check } => generate::run(check),
         Verb::Figures => figures(),

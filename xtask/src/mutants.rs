@@ -1,5 +1,6 @@
 //! Mutants of the crates that run on a board, with cargo-mutants: docs/proof.md. `.cargo/mutants.toml` has its options.
 
+use crate::copy;
 use crate::proof::{add_row, install};
 use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
@@ -13,15 +14,7 @@ pub(crate) fn run(shard: &str) -> Result<()> {
     install("mutants", "27.1.0")?;
     let (_, commit) = program("git").args(["rev-parse", "--short", "HEAD"]).silently()?;
     let tree = root().join("target/mutants/tree");
-    let tar = root().join("target/mutants/tree.tar");
-    std::fs::create_dir_all(&tree)?;
-    // The products of a build there stay.
-    for entry in std::fs::read_dir(&tree)?.flatten().filter(|e| e.file_name() != "target") {
-        let path = entry.path();
-        if path.is_dir() { std::fs::remove_dir_all(path)? } else { std::fs::remove_file(path)? }
-    }
-    program("git").args(["archive", "HEAD", "-o"]).arg(&tar).run()?;
-    program("tar").arg("-xf").arg(&tar).arg("-C").arg(&tree).run()?;
+    copy::last_commit(&tree)?;
     for folder in DECLARED_BY_MACROS {
         declare(&tree.join(folder))?;
     }

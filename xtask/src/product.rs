@@ -83,7 +83,7 @@ fn git(args: &[&str]) -> Result<String> {
     Ok(text)
 }
 
-fn is_product(path: &str) -> bool {
+pub(crate) fn is_product(path: &str) -> bool {
     let lies_in = |folder: &str| match folder.split_once('*') {
         None => path.starts_with(folder),
         Some((before, after)) => {

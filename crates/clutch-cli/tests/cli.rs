@@ -359,7 +359,10 @@ fn a_simulated_board_that_cannot_begin_says_why() {
             "loop board_smc_2 --fault dac-stuck:at=0,volts=99",
             "fault dac-stuck = 99: expected a voltage that the scenario's converter has, V",
         ),
-        ("loop motor_pid --uncertified --fault contact:at=0,factor=0.5", "expected a brake that lets go at 0 V"),
+        (
+            "loop motor_pid --uncertified --fault contact:at=0,factor=0.5",
+            "expected a brake that lets go at 0 V",
+        ),
     ] {
         let words: Vec<&str> = command.split(' ').collect();
         let o = Command::new(env!("CARGO_BIN_EXE_clutch")).args(&words).output().expect("the command starts");

@@ -288,9 +288,9 @@ TablePath(points_s_deg=((0.5, 0.0), (2.0, 20.0)), interpolation='cubic')",
     ),
     known(
         "RunParams",
-        "RunSettings",
+        "RunOptions",
         false,
-        r">>> clutch.RunSettings(duration_s=10, seed=7).seed
+        r">>> clutch.RunOptions(duration_s=10, seed=7).seed
 7",
     ),
     known(
