@@ -4,6 +4,7 @@
 pub mod added;
 pub mod believed;
 pub mod break_away;
+mod confidence;
 pub mod experiment;
 pub mod filter;
 pub mod identified;
