@@ -1,7 +1,7 @@
 //! A block of runs in lockstep: chunks of as many as a vector has lanes.
 
+use super::candidate::{Candidate, Common};
 use super::elementary::Powers;
-use super::group::{Candidate, Common};
 use super::motion::{Motions, Shafts};
 use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
 use super::silence::Silence;

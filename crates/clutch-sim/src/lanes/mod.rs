@@ -16,6 +16,7 @@
 //! alone.
 
 mod block;
+mod candidate;
 mod elementary;
 pub(crate) mod fleet;
 mod group;
