@@ -2,8 +2,9 @@
 
 use super::candidate::{Candidate, Common};
 use super::elementary::Powers;
-use super::motion::{Motions, Shafts};
+use super::motion::Motions;
 use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
+use super::shafts::Shafts;
 use super::silence::Silence;
 use super::vector::InLanes;
 use crate::detected::STAIR;

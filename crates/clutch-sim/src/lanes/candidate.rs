@@ -1,6 +1,6 @@
 //! A run that can go in lanes, at its beginning, and what the runs of a block have in common.
 
-use super::motion::Alike;
+use super::alike::Alike;
 use super::servo::Steered;
 use crate::run::{Prepared, RunSpec};
 use clutch_core::law::LawParams;
