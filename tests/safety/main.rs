@@ -55,7 +55,7 @@ fn what_has_failed_once_is_mended() {
 /// A promise that names a cause, and so can miss it.
 fn needs(draw: &Draw, cause: Cause) -> bool {
     let needs = |t: &Trouble| {
-        let promise = Promise::of(&draw.setting, t);
+        let promise = Promise::of(&draw.healthy, t);
         matches!(promise.fate, Fate::Ends(_)) && promise.causes.contains(&cause)
     };
     draw.troubles.len() == 1 && draw.troubles.iter().any(needs)

@@ -4,7 +4,8 @@
 //! little more than needed, so that the iteration ends; afterwards they shrink, `r_i ← F_i(r)`, and no proof is lost: `F` is
 //! monotone.
 
-use crate::modes::{Affine, E, Mode, S};
+use crate::coordinates::{E, S};
+use crate::modes::{Affine, Mode};
 use crate::setup::{Contradiction, Form, Proof};
 use crate::simplex::{Constraints, Dual, Program};
 use crate::units::Units;

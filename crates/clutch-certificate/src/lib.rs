@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod checker;
+mod coordinates;
 pub mod file;
 mod invariant;
 mod modes;

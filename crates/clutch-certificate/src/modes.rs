@@ -5,16 +5,11 @@
 //! remembers one, and last the encoder: in the exact form the last measured error `m₋`, in the noise form the rounding `φ` of
 //! this tick.
 
+use crate::coordinates::{E, P, S, Z};
 use crate::pieces::{Line, Piece};
 use crate::setup::{Case, Form, ModeId};
 use crate::simplex::Constraints;
 use crate::units::{TARGET_STEP, Units};
-
-pub(crate) const E: usize = 0;
-pub(crate) const S: usize = 1;
-pub(crate) const Z: usize = 2;
-/// Voltages on the way begin here.
-pub(crate) const P: usize = 3;
 
 /// `weights·y + constant`.
 #[derive(Clone, Copy, Debug)]

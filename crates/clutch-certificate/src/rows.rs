@@ -1,7 +1,7 @@
 //! Directions of the set: the state's own, a few that the law sees, and the backward orbits of error and voltage under the
 //! closed loop, which is where the walls of an invariant set stand.
 
-use crate::modes::{E, P, S, Z};
+use crate::coordinates::{E, P, S, Z};
 use crate::setup::{Form, Gains};
 use crate::units::Units;
 

@@ -1,8 +1,9 @@
 //! A certificate for a box: cells of `μ_d`, and for each a set that no tick leaves.
 
 use crate::checker;
+use crate::coordinates::{E, P, S, Z};
 use crate::invariant::{Effort, Open, Search};
-use crate::modes::{E, Mode, P, S, Z, modes};
+use crate::modes::{Mode, modes};
 use crate::pieces::{pieces, strips};
 use crate::rows::{Fineness, rows};
 use crate::setup::{Cell, Certificate, Contradiction, Ends, Form, Gains, Proof, Setup, VERSION};

@@ -1,6 +1,6 @@
 //! The box of one cell in counts, ticks and volts: what the shaft may do in a tick.
 
-use crate::modes::P;
+use crate::coordinates::P;
 use crate::setup::{Ends, Gains, Setup};
 use core::f64::consts::TAU;
 

@@ -9,8 +9,8 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::{Added, Separate};
-use clutch_identify::experiment::{ExperimentError, VirtualBoard};
-use clutch_identify::{Consent, Finding, Identified, Plan, Recording, map_as_believed, map_file};
+use clutch_identify::experiment::{ExperimentError, PartRunner};
+use clutch_identify::{Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
 use serde_json::{Value, json as value};
@@ -170,9 +170,9 @@ impl Identify {
     /// Runs the experiment, and says before what it does.
     fn experiment(&self, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
         let consent = Consent { travel_deg: self.travel, fastest_deg_s: self.fastest };
-        let programme = Plan::of(scenario, &consent)?;
-        let mut plan = format!("{:.0} s of experiment on {}\n", programme.seconds(), self.place());
-        programme.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
+        let experiment = Experiment::of(scenario, &consent)?;
+        let mut plan = format!("{:.0} s of experiment on {}\n", experiment.seconds(), self.place());
+        experiment.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
         remark(&folded(&plan));
         if let Some(folder) = &self.log {
             std::fs::create_dir_all(folder)
@@ -180,14 +180,14 @@ impl Identify {
         }
         #[cfg(target_os = "linux")]
         if let Some(port) = &self.port {
-            return self.at_port(port, scenario, &programme);
+            return self.at_port(port, scenario, &experiment);
         }
-        let logging = |folder: &PathBuf| VirtualBoard::logging(folder.clone(), BUILD);
-        let board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
+        let logging = |folder: &PathBuf| PartRunner::logging(folder.clone(), BUILD);
+        let runner = self.log.as_ref().map_or_else(PartRunner::default, logging);
         // Ctrl-C ends it at once, unless a view is to see the end.
         let looking = if self.live.asked_for() { self.live.looking(&stop_flag()?)? } else { None };
-        let mut board = board.looked_at(looking, BUILD);
-        Ok(programme.run(scenario, &mut |name, part| board.run(name, part))?)
+        let mut runner = runner.looked_at(looking, BUILD);
+        Ok(experiment.run(scenario, &mut |name, part| runner.run(name, part))?)
     }
 
     /// The board of the experiment, in words.
@@ -205,7 +205,7 @@ impl Identify {
         &self,
         port: &Address,
         scenario: &Scenario,
-        programme: &Plan,
+        experiment: &Experiment,
     ) -> anyhow::Result<Vec<Recording>> {
         if !self.uncertified {
             bail!(
@@ -220,7 +220,7 @@ impl Identify {
             let onlooker = live.clone().map(|live| live as Arc<dyn Onlooker>);
             self.on_board(port, &folder.join(format!("{name}.mcap")), (name, part), &stop, onlooker)
         };
-        Ok(programme.run(scenario, run)?)
+        Ok(experiment.run(scenario, run)?)
     }
 
     /// One run of the loop on the board at the port, read from its log.

@@ -4,7 +4,7 @@
 //! A scalar takes a branch where it is cheaper; a vector computes both sides and selects. Each lane of a
 //! vector has the bits that the scalar has: nothing here is fused, and nothing is summed across lanes.
 
-use crate::law::Limit;
+use crate::limit::Limit;
 use core::fmt::Debug;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 

@@ -14,7 +14,8 @@
 //! reported and not refused, since the paper's own path begins with one.
 
 use crate::actuator::ActuatorKind;
-use crate::bounds::{Bounds, Interval};
+use crate::bounds::Bounds;
+use crate::interval::Interval;
 use crate::law::Output;
 use crate::reference::Reference;
 use crate::{Micros, Real};

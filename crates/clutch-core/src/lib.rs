@@ -49,7 +49,9 @@ mod feasibility;
 mod fnv;
 pub mod friction;
 mod friction_map;
+mod interval;
 pub mod law;
+mod limit;
 #[cfg(feature = "linalg")]
 mod observer;
 pub mod params;
@@ -67,7 +69,7 @@ pub use actuator::{
     Actuator, ActuatorKind, ActuatorParams, BothActuator, BrakeActuator, BrakeGeometry, MotorActuator,
 };
 pub use arithmetic::{Arithmetic, Each};
-pub use bounds::{Bounds, Interval, Tolerances};
+pub use bounds::{Bounds, Tolerances};
 pub use codes::{
     Counts, Dac, DacCode, DacParams, Encoder, EncoderParams, FixedCounts, Micros, SamplingParams,
 };
@@ -80,6 +82,7 @@ pub use friction::{
     FrictionModel, FrictionParams, Lugre, LugreParams, Maxwell, MaxwellParams, Stribeck, StribeckParams,
 };
 pub use friction_map::{FrictionMap, NoMap, Place, off_map};
+pub use interval::Interval;
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
 pub use planned::{BeginningAt, OnDisc, Planned};

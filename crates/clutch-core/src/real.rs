@@ -6,7 +6,7 @@
 //! simulator runs the arithmetic of the board.
 
 use crate::arithmetic::Arithmetic;
-use crate::law::Limit;
+use crate::limit::Limit;
 use core::fmt::Display;
 use core::ops::{AddAssign, SubAssign};
 

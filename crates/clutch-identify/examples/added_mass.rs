@@ -5,7 +5,7 @@
 //! ```
 
 use clutch_identify::added::{Added, Separate, separate};
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::{Estimate, Finding, identify};
 use clutch_sim::Scenario;
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ use random_rig::{Outcome, truth};
 use rows::{As, print_row};
 
 fn found(scenario: &Scenario) -> Outcome<clutch_identify::Report> {
-    let mut board = VirtualBoard::default();
-    let run = &mut |name: &str, part: &Scenario| board.run(name, part);
+    let mut runner = PartRunner::default();
+    let run = &mut |name: &str, part: &Scenario| runner.run(name, part);
     Ok(identify(&experiment(scenario, &Programme::default(), run)?))
 }
 

@@ -3,7 +3,7 @@
 //! Each disc of `bench`, with inertia and friction less and a load more than believed, is identified by the product's own
 //! experiment on the simulated board, in virtual time. Glide then rides it as it was believed before, and as it was told.
 
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::rig_file::rig_file;
 use clutch_identify::{Report, RigFile, identify};
 use clutch_sim::progress::UNWATCHED;
@@ -77,9 +77,9 @@ fn print_row(title: &str, of: &[Ride]) {
 fn main() -> Outcome<()> {
     let of = |seed| -> Outcome<(Ride, Ride)> {
         let before = scenario(seed)?;
-        let mut board = VirtualBoard::default();
+        let mut runner = PartRunner::default();
         let programme = Programme::default();
-        let parts = experiment(&before, &programme, &mut |name, part| board.run(name, part))?;
+        let parts = experiment(&before, &programme, &mut |name, part| runner.run(name, part))?;
         Ok((ridden(&before)?, ridden(&told(&before, &identify(&parts))?)?))
     };
     let found = DISCS.into_par_iter().map(of).collect::<Outcome<Vec<_>>>()?;

@@ -5,7 +5,7 @@
 //! cargo run --release --package clutch-identify --example identified_motors -- 200 10001
 //! ```
 
-use clutch_identify::experiment::VirtualBoard;
+use clutch_identify::experiment::PartRunner;
 use clutch_identify::motor::experiment::{Programme, experiment};
 use clutch_identify::motor::{Report, identify};
 use clutch_sim::Scenario;
@@ -38,8 +38,8 @@ const ROWS: &[Row<Truth, Report>] = &[
 fn main() -> Outcome<()> {
     let run = |seed| {
         let truth = truth(seed)?;
-        let mut board = VirtualBoard::default();
-        let run = &mut |name: &str, part: &Scenario| board.run(name, part);
+        let mut runner = PartRunner::default();
+        let run = &mut |name: &str, part: &Scenario| runner.run(name, part);
         let report = identify(&experiment(&truth.scenario, &Programme::default(), run)?);
         Ok((truth, report))
     };

@@ -5,7 +5,7 @@
 //! cargo run --release --package clutch-identify --example identified_rigs -- 200 10001
 //! ```
 
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::{Report, identify};
 use clutch_sim::Scenario;
 
@@ -33,8 +33,8 @@ const ROWS: &[Row<Truth, Report>] = &[
 fn main() -> Outcome<()> {
     let run = |seed| {
         let truth = truth(seed)?;
-        let mut board = VirtualBoard::default();
-        let run = &mut |name: &str, part: &Scenario| board.run(name, part);
+        let mut runner = PartRunner::default();
+        let run = &mut |name: &str, part: &Scenario| runner.run(name, part);
         let report = identify(&experiment(&truth.scenario, &Programme::default(), run)?);
         Ok((truth, report))
     };

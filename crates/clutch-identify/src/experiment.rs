@@ -307,9 +307,9 @@ fn glide(
     checked(base, &format!("ride at {rate} °/s"), t)
 }
 
-/// The scenario's simulated board in virtual time, its shaft where the run before has left it.
+/// Runs the parts of an experiment on the scenario's simulated board in virtual time, the shaft where the part before has left it.
 #[derive(Debug, Default)]
-pub struct VirtualBoard {
+pub struct PartRunner {
     /// Folder for a log of each run, and the version that it states.
     logs: Option<(PathBuf, String)>,
     /// One that looks on, and the version that it is told.
@@ -318,17 +318,17 @@ pub struct VirtualBoard {
     rests_at: Option<f64>,
 }
 
-impl VirtualBoard {
-    /// A board whose runs leave a log each in a folder, which states this version.
+impl PartRunner {
+    /// One whose runs leave a log each in a folder, which states this version.
     #[must_use]
     pub fn logging(folder: PathBuf, version: &str) -> Self {
-        VirtualBoard { logs: Some((folder, version.to_owned())), ..VirtualBoard::default() }
+        PartRunner { logs: Some((folder, version.to_owned())), ..PartRunner::default() }
     }
 
     /// The same, looked at if somebody looks on, who is told this version.
     #[must_use]
     pub fn looked_at(self, looking: Option<Looking>, version: &str) -> Self {
-        VirtualBoard { looking: looking.map(|looking| (looking, version.to_owned())), ..self }
+        PartRunner { looking: looking.map(|looking| (looking, version.to_owned())), ..self }
     }
 
     /// One run, and what was recorded.

@@ -20,26 +20,26 @@ pub struct Consent {
     pub fastest_deg_s: Option<f64>,
 }
 
-/// An experiment that is planned.
+/// An experiment that is to be run.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Plan {
+pub enum Experiment {
     /// On a shaft that is driven, and braked.
     Brake(experiment::Programme),
     /// On an axis that a motor drives both ways.
     Motor(motor::experiment::Programme),
 }
 
-impl Plan {
+impl Experiment {
     /// The experiment for a scenario's rig.
     ///
     /// # Errors
     /// Limits out of their range, or of another rig than a motor axis.
-    pub fn of(scenario: &Scenario, consent: &Consent) -> Result<Plan, ExperimentError> {
+    pub fn of(scenario: &Scenario, consent: &Consent) -> Result<Experiment, ExperimentError> {
         if scenario.spec().rig.actuator.kind() != ActuatorKind::Motor {
             let given = [("travel", consent.travel_deg), ("fastest", consent.fastest_deg_s)];
             return match given.into_iter().find(|(_, limit)| limit.is_some()) {
                 Some((key, _)) => Err(ExperimentError::OfMotors(key)),
-                None => Ok(Plan::Brake(experiment::Programme::default())),
+                None => Ok(Experiment::Brake(experiment::Programme::default())),
             };
         }
         let own = motor::experiment::Programme::default();
@@ -49,15 +49,15 @@ impl Plan {
             ..own
         };
         programme.check()?;
-        Ok(Plan::Motor(programme))
+        Ok(Experiment::Motor(programme))
     }
 
     /// Its length, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         match self {
-            Plan::Brake(programme) => programme.seconds(),
-            Plan::Motor(programme) => programme.seconds(),
+            Experiment::Brake(programme) => programme.seconds(),
+            Experiment::Motor(programme) => programme.seconds(),
         }
     }
 
@@ -65,8 +65,8 @@ impl Plan {
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         match self {
-            Plan::Brake(programme) => programme.plan(),
-            Plan::Motor(programme) => programme.plan(),
+            Experiment::Brake(programme) => programme.plan(),
+            Experiment::Motor(programme) => programme.plan(),
         }
     }
 
@@ -76,8 +76,8 @@ impl Plan {
     /// As [`experiment::experiment`] and [`motor::experiment::experiment`].
     pub fn run(&self, base: &Scenario, run: &mut Runs<'_>) -> Result<Vec<Recording>, ExperimentError> {
         match self {
-            Plan::Brake(programme) => experiment::experiment(base, programme, run),
-            Plan::Motor(programme) => motor::experiment::experiment(base, programme, run),
+            Experiment::Brake(programme) => experiment::experiment(base, programme, run),
+            Experiment::Motor(programme) => motor::experiment::experiment(base, programme, run),
         }
     }
 }

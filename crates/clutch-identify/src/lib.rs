@@ -4,6 +4,7 @@
 pub mod added;
 pub mod believed;
 pub mod break_away;
+mod confidence;
 pub mod experiment;
 pub mod filter;
 pub mod identified;
@@ -18,7 +19,7 @@ pub mod shown;
 pub mod unlike;
 
 pub use believed::{Believed, Corner, believed};
-pub use identified::{Consent, Identified, Plan};
+pub use identified::{Consent, Experiment, Identified};
 pub use map_file::{map_as_believed, map_file};
 pub use recording::{ReadError, Recording, Tick};
 pub use report::{Finding, Report, identify};

@@ -1,17 +1,13 @@
 //! Findings of recordings on a shaft, and what they cannot show.
 
 use crate::break_away::{self, BreakAway, Known, break_aways};
+use crate::confidence::{DEVIATIONS, FALL};
 use crate::recording::Recording;
 use crate::release::{self, Fall, Release};
 use crate::ride::{Place, Ride, Told, rides, uneven};
 use crate::{DAMPINGS, Estimate, unlike};
 use serde::Serialize;
 
-/// Standard deviations on either side of a value whose distribution is nearly normal. Two cover 90 %, not 95: the
-/// ripple that the filter believes in is not quite the disc's.
-pub(crate) const DEVIATIONS: f64 = 2.5;
-/// Fall of a logarithm of a likelihood at the ends of an interval.
-pub(crate) const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 /// Rates that determine C/J lie this far apart, rad/s.
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that determine μ_s/μ_d.

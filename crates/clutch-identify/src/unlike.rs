@@ -6,8 +6,8 @@
 //! | bristles whose stiffness does not scale with the brake's force | rides: a voltage takes effect over a way, and so the later the slower the shaft |
 //! | a disc that is not square to its shaft | rides: friction differs from section to section of the turn |
 
+use crate::confidence::FALL;
 use crate::release::{Apart, Fall, Unexplained};
-use crate::report::FALL;
 use crate::ride::{Ride, Told};
 
 /// Ways over which a voltage may take effect, counts.

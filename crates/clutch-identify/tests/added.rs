@@ -1,7 +1,7 @@
 //! Torque and inertia one by one, from two experiments.
 
 use clutch_identify::added::{Added, Separate, separate};
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::{Finding, Report, identify};
 use clutch_sim::Scenario;
 
@@ -12,8 +12,8 @@ use random_rig::added::heavier;
 use random_rig::truth;
 
 fn found(scenario: &Scenario) -> Report {
-    let mut board = VirtualBoard::default();
-    identify(&experiment(scenario, &Programme::default(), &mut |name, part| board.run(name, part)).unwrap())
+    let mut runner = PartRunner::default();
+    identify(&experiment(scenario, &Programme::default(), &mut |name, part| runner.run(name, part)).unwrap())
 }
 
 fn why(separate: &Separate) -> &str {

@@ -1,6 +1,6 @@
 //! Estimates of shafts that the estimators know nothing of, and refusals.
 
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::release::{fall, releases};
 use clutch_identify::{DAMPINGS, Finding, Recording, Report, Tick, identify};
 use clutch_sim::Scenario;
@@ -44,8 +44,8 @@ volts_v = 9.99
 fn recordings(set: &[(&str, &str)]) -> Vec<Recording> {
     let set: Vec<(String, String)> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     let scenario = Scenario::parse("rig", RIG, &set).unwrap();
-    let mut board = VirtualBoard::default();
-    experiment(&scenario, &Programme::default(), &mut |name, part| board.run(name, part)).unwrap()
+    let mut runner = PartRunner::default();
+    experiment(&scenario, &Programme::default(), &mut |name, part| runner.run(name, part)).unwrap()
 }
 
 fn assert_known(finding: &Finding, truth: f64, within: f64) {

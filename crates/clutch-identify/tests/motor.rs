@@ -1,9 +1,9 @@
 //! Estimates of motor axes that the estimators know nothing of, and refusals.
 
 use clutch_core::ActuatorKind;
-use clutch_identify::experiment::VirtualBoard;
+use clutch_identify::experiment::PartRunner;
 use clutch_identify::motor::Report;
-use clutch_identify::{Consent, Estimate, Finding, Identified, Plan, Recording, RigFile};
+use clutch_identify::{Consent, Estimate, Experiment, Finding, Identified, Recording, RigFile};
 use clutch_sim::Scenario;
 
 #[path = "../examples/random_rig/mod.rs"]
@@ -12,9 +12,9 @@ mod random_rig;
 use random_rig::motor::{Truth, truth};
 
 fn recordings(truth: &Truth) -> Vec<Recording> {
-    let plan = Plan::of(&truth.scenario, &Consent::default()).unwrap();
-    let mut board = VirtualBoard::default();
-    plan.run(&truth.scenario, &mut |name, part| board.run(name, part)).unwrap()
+    let experiment = Experiment::of(&truth.scenario, &Consent::default()).unwrap();
+    let mut runner = PartRunner::default();
+    experiment.run(&truth.scenario, &mut |name, part| runner.run(name, part)).unwrap()
 }
 
 fn of(recordings: &[Recording]) -> Report {
@@ -116,22 +116,23 @@ fn parts_tell_what_they_can(all: &[Recording]) {
 #[test]
 fn limits_are_held_and_bad_ones_named() {
     let truth = truth(10_003).unwrap();
-    let plan =
-        |travel, fastest| Plan::of(&truth.scenario, &Consent { travel_deg: travel, fastest_deg_s: fastest });
+    let experiment = |travel, fastest| {
+        Experiment::of(&truth.scenario, &Consent { travel_deg: travel, fastest_deg_s: fastest })
+    };
     for (travel, fastest, said) in [
         (Some(3.0), None, "travel = 3 °: expected 10 to 3600 °"),
         (None, Some(f64::NAN), "fastest = NaN °/s: expected 15 to 3600 °/s"),
     ] {
-        assert_eq!(plan(travel, fastest).unwrap_err().to_string(), said);
+        assert_eq!(experiment(travel, fastest).unwrap_err().to_string(), said);
     }
     let brake = Scenario::load(std::path::Path::new("board_smc_2"), &[]).unwrap();
     let consent = Consent { travel_deg: Some(30.0), fastest_deg_s: None };
-    assert!(Plan::of(&brake, &consent).unwrap_err().to_string().starts_with("travel: is a limit"));
+    assert!(Experiment::of(&brake, &consent).unwrap_err().to_string().starts_with("travel: is a limit"));
 
     // Nowhere does the shaft leave the way that was consented to by more than the law's own error.
-    let mut board = VirtualBoard::default();
-    let narrow = plan(Some(12.0), Some(30.0)).unwrap();
-    let all = narrow.run(&truth.scenario, &mut |name, part| board.run(name, part)).unwrap();
+    let mut runner = PartRunner::default();
+    let narrow = experiment(Some(12.0), Some(30.0)).unwrap();
+    let all = narrow.run(&truth.scenario, &mut |name, part| runner.run(name, part)).unwrap();
     let degrees = |counts: i64| counts as f64 * 360.0 / 20_000.0;
     let counts = || all.iter().flat_map(|r| r.ticks.iter().map(|t| t.counts));
     assert!(degrees(counts().max().unwrap()) < 13.5 && degrees(counts().min().unwrap()) > -1.5);

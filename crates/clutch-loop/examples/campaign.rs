@@ -97,10 +97,10 @@ fn row(law: &str, trouble: &str, runs: usize, first: u64) -> Failure {
             return Err(format!("no run of ten million has to end by \"{trouble}\" under {law}").into());
         }
         let [only] = &draw.troubles[..] else { continue };
-        if draw.setting.law != law || only.kind() != trouble {
+        if draw.healthy.law != law || only.kind() != trouble {
             continue;
         }
-        let Fate::Ends(within) = Promise::of(&draw.setting, only).fate else { continue };
+        let Fate::Ends(within) = Promise::of(&draw.healthy, only).fate else { continue };
         let report = draw.run(run.seed, Checks::ALL, false)?;
         if let Some(wrong) = oracle::judge(&draw, &report) {
             failures += 1;
@@ -114,7 +114,7 @@ fn row(law: &str, trouble: &str, runs: usize, first: u64) -> Failure {
     println!("the nearest to their promises:");
     shown.sort_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
     for (after, within, run) in shown.iter().take(SHOWN) {
-        println!("  {after:.2} of {within:.2} ms: {run}: {:?}", run.draw().setting);
+        println!("  {after:.2} of {within:.2} ms: {run}: {:?}", run.draw().healthy);
     }
     if failures == 0 { Ok(()) } else { Err("the campaign failed".into()) }
 }
@@ -125,9 +125,9 @@ fn only(runs: &[String]) -> Failure {
         let run: RunId = name.parse()?;
         let draw = run.draw();
         let report = draw.run(run.seed, Checks::ALL, false)?;
-        println!("{run}: {:?}", draw.setting);
+        println!("{run}: {:?}", draw.healthy);
         for trouble in &draw.troubles {
-            println!("  {trouble:?}: {:?}", Promise::of(&draw.setting, trouble));
+            println!("  {trouble:?}: {:?}", Promise::of(&draw.healthy, trouble));
         }
         println!(
             "  {:?} hit {:?} tripped {:?} safe {:?} board {:?} error {:.3}° beyond {:.3}° (allowed {:?}) unanswered {} kick {:.2} V",
@@ -138,7 +138,7 @@ fn only(runs: &[String]) -> Failure {
             report.board,
             report.largest_error.to_degrees(),
             report.overrun.to_degrees(),
-            oracle::beyond_deg(&draw.setting, 0.01),
+            oracle::beyond_deg(&draw.healthy, 0.01),
             report.unanswered,
             report.kick,
         );

@@ -6,10 +6,10 @@ use crate::run::unless_interrupted;
 use crate::stepping::native;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::Added;
-use clutch_identify::experiment::{ExperimentError, VirtualBoard};
+use clutch_identify::experiment::{ExperimentError, PartRunner};
 use clutch_identify::recording::ReadError;
 use clutch_identify::shown::{MOTOR_ROWS, ROWS};
-use clutch_identify::{Consent, Identified, Plan, Recording, RigFile, believed};
+use clutch_identify::{Consent, Experiment, Identified, Recording, RigFile, believed};
 use clutch_sim::Scenario;
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -90,11 +90,10 @@ pub(crate) fn identify<'py>(
     }
     let found = py.detach(|| {
         let recordings = if logs.is_empty() {
-            let mut board = log.map_or_else(VirtualBoard::default, |folder| {
-                VirtualBoard::logging(folder, clutch_cli::BUILD)
-            });
-            let plan = Plan::of(&scenario.0, &Consent { travel_deg, fastest_deg_s })?;
-            plan.run(&scenario.0, &mut |name, part| board.run(name, part))?
+            let mut runner =
+                log.map_or_else(PartRunner::default, |folder| PartRunner::logging(folder, clutch_cli::BUILD));
+            let experiment = Experiment::of(&scenario.0, &Consent { travel_deg, fastest_deg_s })?;
+            experiment.run(&scenario.0, &mut |name, part| runner.run(name, part))?
         } else {
             recordings
         };

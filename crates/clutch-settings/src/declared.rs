@@ -1,5 +1,6 @@
 //! The settings of a run: one tree of parameters, each declared once, and the keys that follow.
 
+use super::points::FIRST_KNOT;
 use clutch_core::law::{LawParams, OutputParams, ShellParams};
 use clutch_core::params::{ChoiceInfo, Conversion, Info, Kind, NONE, Range, Row, TableInfo, Unit};
 use clutch_core::reference::ReferenceParams;
@@ -69,7 +70,7 @@ const DECLARED: &TableInfo = &<RunSettings<'static> as clutch_core::params::Tabl
 /// Settings, but for the points of a table.
 pub const SETTINGS: usize = DECLARED.places();
 
-const _: () = assert!(SETTINGS < super::FIRST_KNOT as usize, "keys of their own for the points of a table");
+const _: () = assert!(SETTINGS < FIRST_KNOT as usize, "keys of their own for the points of a table");
 
 /// Hash of the settings (FNV-1a, 64 bit, over `name:type:unit` and a line feed each, in the order of the keys):
 /// two ends with the same hash mean the same by each key.

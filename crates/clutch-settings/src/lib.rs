@@ -13,11 +13,13 @@
 
 mod declared;
 mod path;
+mod points;
 mod refused;
 mod walk;
 
 pub use declared::{Declared, Name, RunSettings, RunTimes, SETTINGS, SETTINGS_HASH, Setting};
 pub use path::{Path, Prepared};
+pub use points::MAX_KNOTS;
 pub use refused::Refusing;
 
 use clutch_core::params::{Params, Table as _};
@@ -26,13 +28,8 @@ use clutch_core::{
     Bounds, Encoder, EncoderParams, FixedCounts, ParamError, SamplingParams, Servo, ServoParams, Supervisor,
     SupervisorParams, VelocityParams,
 };
+use points::FIRST_KNOT;
 use walk::{Place, Visit, Walk};
-
-/// Points that a path given as a table may have on a board: 4 kB.
-pub const MAX_KNOTS: usize = 256;
-
-/// Key of the first number of the points; each has two: time (µs), position (2⁻¹⁶ counts).
-const FIRST_KNOT: u16 = 0x1000;
 
 /// A run that a board cannot take.
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,5 +1,6 @@
 //! The path of a run, with the points of a table kept elsewhere.
 
+use super::points::MAX_KNOTS;
 use clutch_core::reference::{self, Interpolation, Knot, Reference, ReferenceParams, Steepness, Table};
 use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
 
@@ -96,14 +97,14 @@ impl Path {
 /// Share of each point in the targets of a table.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    steepness: [Steepness; super::MAX_KNOTS],
-    slopes: [f32; super::MAX_KNOTS],
+    steepness: [Steepness; MAX_KNOTS],
+    slopes: [f32; MAX_KNOTS],
 }
 
 impl Default for Prepared {
     /// Of no table.
     #[inline] // in place: a copy of it would be on the stack of who keeps it
     fn default() -> Self {
-        Prepared { steepness: [Steepness::default(); super::MAX_KNOTS], slopes: [0.0; super::MAX_KNOTS] }
+        Prepared { steepness: [Steepness::default(); MAX_KNOTS], slopes: [0.0; MAX_KNOTS] }
     }
 }

@@ -3,7 +3,7 @@
 use crate::meter::{Gap, Meter, Tally};
 use crate::metrics::Detected;
 use crate::number;
-use crate::run::{Keep, RunSpec};
+use crate::run_spec::{Keep, RunSpec};
 use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams, StickSlipState};
 
 /// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.

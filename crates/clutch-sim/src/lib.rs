@@ -25,6 +25,7 @@ pub mod referee;
 pub mod rig;
 pub mod ripple;
 pub mod run;
+mod run_spec;
 pub mod scenario;
 mod scenario_error;
 pub mod smooth_speed;

@@ -9,7 +9,7 @@
 #[allow(dead_code, reason = "its motors are of another example")]
 mod random_rig;
 
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::rig_file::rig_file;
 use clutch_identify::{RigFile, identify};
 use clutch_loop::from_scenario::{self, BuiltRun};
@@ -124,9 +124,9 @@ fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<&'static str>> {
 
 fn course(seed: u64) -> Outcome<Course> {
     let truth = truth(seed)?;
-    let mut board = VirtualBoard::default();
+    let mut runner = PartRunner::default();
     let recordings =
-        experiment(&truth.scenario, &Programme::default(), &mut |name, part| board.run(name, part))?;
+        experiment(&truth.scenario, &Programme::default(), &mut |name, part| runner.run(name, part))?;
     let file = rig_file(&identify(&recordings), &truth.scenario)?;
     let file = RigFile::parse("rig.toml", &file)?;
     let start = Instant::now();

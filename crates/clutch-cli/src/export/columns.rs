@@ -1,6 +1,6 @@
 //! A table as Parquet: its columns are those that Python gives, with their units and meanings.
 
-use super::Table;
+use super::table::Table;
 use crate::columnar::{Column, Columnar, TOGETHER, field};
 use arrow_schema::{DataType, Field};
 use clutch_core::params::Unit;

@@ -1,6 +1,6 @@
 //! A table as CSV.
 
-use super::Table;
+use super::table::Table;
 use clutch_log::{Channel, Header, Kind, TIME, Value, word};
 use std::fs::File;
 use std::io;

@@ -3,16 +3,18 @@
 #[cfg(feature = "parquet")]
 mod columns;
 mod lines;
+mod table;
 
 use crate::output::{Exit, new_file, tell, warn, wrote};
 use crate::signals::stop_flag;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use clutch_log::{CHANNELS, Channel, Header, InChannel, Limits, LogError, Record, Value};
+use clutch_log::{CHANNELS, Channel, Header, InChannel, Limits, LogError, Record};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use table::Table;
 
 #[derive(Args)]
 pub(crate) struct Export {
@@ -31,14 +33,6 @@ pub(crate) struct Export {
 fn channels() -> PossibleValuesParser {
     let tables = CHANNELS.iter().filter(|c| c.fields.iter().any(|f| f.name == "tick"));
     PossibleValuesParser::new(tables.map(|c| c.topic.trim_start_matches('/')))
-}
-
-/// A table that is being written.
-trait Table {
-    /// The time of a record, s, and the values of its fields.
-    fn row(&mut self, time: f64, values: &mut dyn Iterator<Item = Value>) -> io::Result<()>;
-    /// All rows are there.
-    fn end(self: Box<Self>) -> io::Result<()>;
 }
 
 /// Begins a table in a new file.

@@ -16,7 +16,8 @@ mod micro_step;
 mod output;
 mod shell;
 
-pub use output::{Limit, Output, OutputParams, OutputState};
+pub use crate::limit::Limit;
+pub use output::{Output, OutputParams, OutputState};
 pub use shell::{Shell, ShellParams};
 
 use crate::edge_timed::EdgeTimedParams;

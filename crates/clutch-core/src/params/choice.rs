@@ -45,26 +45,6 @@ macro_rules! choice {
     };
 }
 
-/// The text of a declaration, from the lines of its comment.
-#[doc(hidden)]
-#[cfg(not(feature = "terse"))]
-#[macro_export]
-macro_rules! __text {
-    ($($line:literal)+) => {
-        concat!($($line, "\n"),+).trim_ascii()
-    };
-}
-
-/// Nothing of it.
-#[doc(hidden)]
-#[cfg(feature = "terse")]
-#[macro_export]
-macro_rules! __text {
-    ($($line:literal)+) => {
-        ""
-    };
-}
-
 /// The same choice in another scalar.
 #[doc(hidden)]
 #[macro_export]

@@ -1,33 +1,7 @@
 //! Declarations of parameters, without values: rows, tables, choices. Hosts read them: scenario files,
 //! errors, documentation, Python. No function that a board runs does, so that no text is linked there.
 
-use super::{Range, Unit};
-
-/// The kind of a single parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
-    /// A real number.
-    Real,
-    /// A whole number of at least 0.
-    Whole,
-    /// True or false.
-    Switch,
-    /// One of several words.
-    Word(&'static [Word]),
-    /// A text.
-    Text,
-    /// A list of pairs of numbers.
-    Points,
-}
-
-/// A word that a parameter may be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Word {
-    /// The word.
-    pub name: &'static str,
-    /// Its meaning.
-    pub doc: &'static str,
-}
+use super::{Kind, Range, Unit};
 
 /// A parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,13 +8,15 @@
 
 mod choice;
 mod info;
+mod kind;
 mod leaf;
 mod range;
 mod table;
 mod table_ref;
 mod unit;
 
-pub use info::{ChoiceInfo, Info, Kind, Nested, OptionInfo, RelationInfo, Row, TableInfo, Word};
+pub use info::{ChoiceInfo, Info, Nested, OptionInfo, RelationInfo, Row, TableInfo};
+pub use kind::{Kind, Word};
 pub use leaf::Leaf;
 pub use range::{Range, Words};
 pub use table::Relation;

@@ -1,7 +1,19 @@
 //! The macros that declare parameters.
 
-use super::TableRef;
+use super::{Table, TableRef};
 use crate::{ParamError, Real};
+
+impl TableRef {
+    /// The table of this type.
+    #[must_use]
+    pub const fn of<T: Real, P: Table<T>>() -> TableRef {
+        TableRef {
+            id: P::TABLE.id,
+            #[cfg(not(target_os = "none"))]
+            info: &P::TABLE,
+        }
+    }
+}
 
 /// A condition that a parameter fulfils together with others: declared with the table, asked for where all
 /// the others are known.
@@ -110,6 +122,26 @@ macro_rules! params {
             [$($doc)+] [#[derive(Copy)]] [$vis] $name [$life] [$life] [$life] [$life, T: $crate::Real] [$life] T
             { $($body)* } $($rest)*
         }
+    };
+}
+
+/// The text of a declaration, from the lines of its comment.
+#[doc(hidden)]
+#[cfg(not(feature = "terse"))]
+#[macro_export]
+macro_rules! __text {
+    ($($line:literal)+) => {
+        concat!($($line, "\n"),+).trim_ascii()
+    };
+}
+
+/// Nothing of it.
+#[doc(hidden)]
+#[cfg(feature = "terse")]
+#[macro_export]
+macro_rules! __text {
+    ($($line:literal)+) => {
+        ""
     };
 }
 

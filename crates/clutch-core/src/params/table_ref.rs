@@ -1,7 +1,6 @@
 //! The table that an error speaks of.
 
-use super::{Table, TableInfo};
-use crate::Real;
+use super::TableInfo;
 use core::fmt;
 
 /// A table, by its number; on a host also by what is known of it.
@@ -9,22 +8,12 @@ use core::fmt;
 /// A board reports a number: were the words within its reach, they would take a fifth of its flash.
 #[derive(Clone, Copy)]
 pub struct TableRef {
-    id: u32,
+    pub(super) id: u32,
     #[cfg(not(target_os = "none"))]
-    info: &'static TableInfo,
+    pub(super) info: &'static TableInfo,
 }
 
 impl TableRef {
-    /// The table of this type.
-    #[must_use]
-    pub const fn of<T: Real, P: Table<T>>() -> TableRef {
-        TableRef {
-            id: P::TABLE.id,
-            #[cfg(not(target_os = "none"))]
-            info: &P::TABLE,
-        }
-    }
-
     /// [`TableInfo::id`].
     #[must_use]
     pub const fn id(self) -> u32 {

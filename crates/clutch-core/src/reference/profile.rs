@@ -1,6 +1,7 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
-use super::{Scale, Target, advance};
+use super::scale::{Scale, advance};
+use super::target::Target;
 use crate::params::{Range, Table};
 use crate::{FixedCounts, ParamError, Real};
 

@@ -1,6 +1,6 @@
 //! A path through points in time.
 
-use super::Target;
+use super::target::Target;
 use crate::params::{self, Editor, Kind, Leaf, Range, Unit};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 

@@ -1,6 +1,7 @@
 //! Sine and chirp on a ramp. The phase is an integer in 2⁻⁶⁴ turns, so it never drifts.
 
-use super::{Scale, Target, advance};
+use super::scale::{Scale, advance};
+use super::target::Target;
 use crate::params::{Range, Table};
 use crate::{ParamError, Real, sin_cos_turns};
 

@@ -17,8 +17,8 @@
 //!
 //! Positions are counts from the newest sample's, velocities counts per period.
 
+use super::cause::Cause;
 use super::params::LimitParams;
-use super::state::Cause;
 use crate::actuator::ActuatorKind;
 use crate::law::OutputParams;
 use crate::{Bounds, Dac, DacCode, Real};

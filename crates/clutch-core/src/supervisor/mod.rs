@@ -41,21 +41,24 @@
 //! The supervisor owns no clock. A log records all of its input, so a replay decides the
 //! same at every tick.
 
+mod cause;
 mod envelope;
+mod limits;
 mod pace;
 mod params;
 mod state;
 
+pub use cause::{Cause, Checks};
 pub use pace::Pace;
 pub use params::{LimitParams, SpeedLimit, SupervisorParams};
-pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
+pub use state::{Arrival, BoardMode, Cycle, Sample, State, SupervisorState};
 
 use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
 use crate::{
     Bounds, Counts, Dac, DacCode, Micros, ParamError, Planned, Real, Servo, ServoOutput, ServoParams, Target,
 };
-use params::Limits;
+use limits::Limits;
 
 /// A checked supervisor; never changes in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use super::bristles::bristled;
 use super::{Outcome, Truth, truth};
 use clutch_identify::Recording;
-use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{ExperimentError, PartRunner, Programme, experiment};
 use clutch_sim::Scenario;
 use clutch_sim::drive::DriveParams;
 use rand::{RngExt, SeedableRng};
@@ -67,7 +67,7 @@ pub(crate) fn recordings(kind: Unlike, seed: u64) -> Outcome<(Truth, Option<Vec<
     let share = |least: f64, most: f64| least + (most - least) * part;
     let spaced = |least: f64, most: f64| least * (most / least).powf(turns);
     let programme = Programme::default();
-    let mut board = VirtualBoard::default();
+    let mut runner = PartRunner::default();
     let mut elapsed = 0.0;
     let mut rests_at = 0.0;
     let mut run = |name: &str, base: &Scenario| {
@@ -135,7 +135,7 @@ pub(crate) fn recordings(kind: Unlike, seed: u64) -> Outcome<(Truth, Option<Vec<
             }
             Unlike::Lag => chosen(base, "", &[("rig.actuator_time_constant_s", share(1e-3, 3e-3))])?,
         };
-        board.run(name, &unlike)
+        runner.run(name, &unlike)
     };
     match experiment(&truth.scenario, &programme, &mut run) {
         Ok(recordings) => Ok((truth, Some(recordings))),

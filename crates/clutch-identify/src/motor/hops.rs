@@ -5,9 +5,9 @@
 
 use crate::Estimate;
 use crate::break_away::{Profile, spaced};
+use crate::confidence::FALL;
 use crate::filter::{Belief, Shaft};
 use crate::recording::Recording;
-use crate::report::FALL;
 use crate::ride;
 
 /// Samples for which the shaft has to have rested before, and within which its voltage has to have jumped, by a share of it.

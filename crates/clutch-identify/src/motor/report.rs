@@ -5,8 +5,9 @@ use super::passes::{self, Curve, Pass};
 use super::slips::{self, Slip};
 use crate::Estimate;
 use crate::break_away::{Profile, spaced};
+use crate::confidence::{DEVIATIONS, FALL};
 use crate::recording::Recording;
-use crate::report::{DEVIATIONS, FALL, Finding, refused};
+use crate::report::{Finding, refused};
 use crate::ride::Place;
 use serde::Serialize;
 

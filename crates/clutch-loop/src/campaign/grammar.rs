@@ -1,4 +1,4 @@
-//! The grammar of the campaign: a setting, and in it one trouble or two, drawn from a seed.
+//! The grammar of the campaign: a healthy run, and in it one trouble or two, drawn from a seed.
 //!
 //! A trouble is where × what × from when × how long × how often. The tables below say which there are.
 
@@ -9,109 +9,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// The rig of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RigName {
-    /// The paper's.
-    Paper,
-    /// The stand-in for the experiment: friction a third weaker and uneven, a period of delay.
-    Bench,
-    /// A geared motor axis with friction.
-    Motor,
-}
-
-impl RigName {
-    /// Each of them.
-    pub(super) const ALL: [RigName; 3] = [RigName::Paper, RigName::Bench, RigName::Motor];
-}
-
-/// The safe state of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Safe {
-    /// Holds, V.
-    Hold(f64),
-    /// Ramps at a rate (V/s) to a voltage (V).
-    Ramp(f64, f64),
-    /// Lets go.
-    Release,
-    /// Holds (V) and lets go after a time (s).
-    HoldThenRelease(f64, f64),
-}
-
-/// A path from rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PathKind {
-    /// A ramp, °/s.
-    Ramp(f64),
-    /// From rest to rest in two seconds, with this as its top speed, °/s.
-    MinimumJerk(f64),
-    /// A ramp with a sine of 2 Hz on it, °/s.
-    Sine(f64),
-}
-
-impl PathKind {
-    /// Its highest speed, °/s.
-    #[must_use]
-    pub fn top_deg_s(self) -> f64 {
-        match self {
-            PathKind::Ramp(v) | PathKind::MinimumJerk(v) => v,
-            PathKind::Sine(v) => v * (1.0 + SINE_DEG_PER_DEG_S * std::f64::consts::TAU * 2.0),
-        }
-    }
-}
-
-impl PathKind {
-    /// Largest acceleration, °/s².
-    pub(super) fn steepest_deg_s2(self) -> f64 {
-        match self {
-            PathKind::Ramp(_) => 0.0,
-            // 5.7735 times its distance, by the square of its 2 s.
-            PathKind::MinimumJerk(v) => 5.7735 * (v / 1.875 * 2.0) / 4.0,
-            PathKind::Sine(v) => v * SINE_DEG_PER_DEG_S * (std::f64::consts::TAU * 2.0).powi(2),
-        }
-    }
-
-    /// Its lowest speed where troubles begin, °/s.
-    #[must_use]
-    pub fn slowest_deg_s(self) -> f64 {
-        match self {
-            PathKind::Ramp(v) => v,
-            // At a quarter of its time.
-            PathKind::MinimumJerk(v) => 0.56 * v,
-            PathKind::Sine(v) => v * (1.0 - SINE_DEG_PER_DEG_S * std::f64::consts::TAU * 2.0),
-        }
-    }
-}
-
-/// Amplitude of a path's sine, ° per °/s of its ramp.
-pub(super) const SINE_DEG_PER_DEG_S: f64 = 0.03;
-
-/// A healthy run, but for its troubles.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
-    /// Its rig.
-    pub rig: RigName,
-    /// Its law, by the name in scenarios.
-    pub law: &'static str,
-    /// Its path.
-    pub path: PathKind,
-    /// True if `[bounds]` know the plant to 10 % (friction to 20 %) only.
-    pub wide: bool,
-    /// Its safe state.
-    pub safe: Safe,
-    /// True if the velocity is the observer's.
-    pub observer: bool,
-    /// True in single precision.
-    pub single: bool,
-    /// Periods of delay of the rig.
-    pub delay: u32,
-    /// The line, one way, ns.
-    pub latency_ns: u64,
-    /// Periods without an answer that board and supervisor wait.
-    pub cycles: u32,
-    /// Good samples after one that was refused.
-    pub good_samples: u32,
-}
+pub use super::healthy_run::{HealthyRun, PathKind, RigName, Safe};
 
 /// Trouble's place and kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,7 +111,7 @@ pub const PLAIN: [&str; 11] =
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draw {
     /// Everything but the troubles.
-    pub setting: Setting,
+    pub healthy: HealthyRun,
     /// None, one or two.
     pub troubles: Vec<Trouble>,
 }
@@ -223,16 +121,16 @@ impl Draw {
     #[must_use]
     pub fn new(seed: u64, without: &[&str]) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut setting = setting(&mut rng);
+        let mut healthy = healthy_run(&mut rng);
         let mut troubles = Vec::new();
         if rng.random_bool(0.95) {
-            troubles.push(trouble(&mut rng, &setting, any));
+            troubles.push(trouble(&mut rng, &healthy, any));
             if rng.random_bool(0.2) {
-                troubles.push(trouble(&mut rng, &setting, any));
+                troubles.push(trouble(&mut rng, &healthy, any));
             }
         }
         if !without.contains(&"later") {
-            later(seed, &mut setting, &mut troubles);
+            later(seed, &mut healthy, &mut troubles);
         }
         // A controller is slow in one way.
         if troubles.iter().all(|t| matches!(t.what, What::Slow(_) | What::ControllerDies)) {
@@ -242,27 +140,27 @@ impl Draw {
             match *part {
                 "second" => troubles.truncate(1),
                 "first" if troubles.len() > 1 => drop(troubles.remove(0)),
-                "bench" if setting.rig == RigName::Bench => setting.rig = RigName::Paper,
-                "wide" => setting.wide = false,
-                "observer" => setting.observer = false,
-                "single" => setting.single = false,
-                "delay" if setting.rig == RigName::Paper => setting.delay = 0,
-                "latency" => setting.latency_ns = 50_000,
-                "cycles" => setting.cycles = 3,
-                "path" => setting.path = PathKind::Ramp(setting.path.top_deg_s()),
+                "bench" if healthy.rig == RigName::Bench => healthy.rig = RigName::Paper,
+                "wide" => healthy.wide = false,
+                "observer" => healthy.observer = false,
+                "single" => healthy.single = false,
+                "delay" if healthy.rig == RigName::Paper => healthy.delay = 0,
+                "latency" => healthy.latency_ns = 50_000,
+                "cycles" => healthy.cycles = 3,
+                "path" => healthy.path = PathKind::Ramp(healthy.path.top_deg_s()),
                 _ => {}
             }
         }
         // A load that the voltage's limit is to show: the law that goes there, and no other trouble.
         if let Some(load) = troubles.iter().find(|t| matches!(t.what, What::Load(_))).copied() {
-            setting.rig = RigName::Paper;
-            setting.law = laws::TO_ITS_LIMIT;
-            setting.path = PathKind::Ramp(20.0);
-            setting.safe = Safe::Hold(9.99);
-            (setting.wide, setting.observer, setting.delay) = (false, false, 0);
+            healthy.rig = RigName::Paper;
+            healthy.law = laws::TO_ITS_LIMIT;
+            healthy.path = PathKind::Ramp(20.0);
+            healthy.safe = Safe::Hold(9.99);
+            (healthy.wide, healthy.observer, healthy.delay) = (false, false, 0);
             troubles = vec![load];
         }
-        Draw { setting, troubles }
+        Draw { healthy, troubles }
     }
 }
 
@@ -280,7 +178,7 @@ fn filters(law: &str) -> bool {
     LawParams::<f64>::named(law).is_some_and(|law| law.filter().is_some())
 }
 
-fn setting(rng: &mut Pcg64) -> Setting {
+fn healthy_run(rng: &mut Pcg64) -> HealthyRun {
     let rig = [RigName::Paper, RigName::Paper, RigName::Paper, RigName::Bench, RigName::Motor];
     let rig = pick(rng, &rig, RigName::Paper);
     let law = pick(rng, laws::drawn(rig), laws::TO_ITS_LIMIT);
@@ -310,7 +208,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
         RigName::Paper if laws::of(law).bears_delay => rng.random_range(0..=1),
         _ => 0,
     };
-    Setting {
+    HealthyRun {
         rig,
         law,
         path,
@@ -327,23 +225,23 @@ fn setting(rng: &mut Pcg64) -> Setting {
 
 /// Draws that came later than the others, from a stream of their own: a seed keeps what it drew before, and a run whose name
 /// has `later` in it leaves these out.
-fn later(seed: u64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
+fn later(seed: u64, healthy: &mut HealthyRun, troubles: &mut Vec<Trouble>) {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x006c_6174_6572);
     let rng = &mut rng;
-    if follows(setting.law) && rng.random_bool(0.25) {
-        setting.law = pick(rng, &laws::drawn_later(), setting.law);
+    if follows(healthy.law) && rng.random_bool(0.25) {
+        healthy.law = pick(rng, &laws::drawn_later(), healthy.law);
     }
-    let brake = setting.rig != RigName::Motor;
+    let brake = healthy.rig != RigName::Motor;
     match rng.random_range(0..16) {
-        0 if brake && !troubles.is_empty() => troubles[0] = trouble(rng, setting, pad),
-        1 => gap(rng, setting, troubles),
-        2 => gap_in_an_observer(rng, setting, troubles),
+        0 if brake && !troubles.is_empty() => troubles[0] = trouble(rng, healthy, pad),
+        1 => gap(rng, healthy, troubles),
+        2 => gap_in_an_observer(rng, healthy, troubles),
         _ => {}
     }
 }
 
 /// The pad and what presses it.
-fn pad(rng: &mut Pcg64, _: &Setting) -> What {
+fn pad(rng: &mut Pcg64, _: &HealthyRun) -> What {
     let kind = match rng.random_range(0..3) {
         0 => FaultKind::Lever,
         1 => FaultKind::Contact(0.0),
@@ -353,28 +251,28 @@ fn pad(rng: &mut Pcg64, _: &Setting) -> What {
 }
 
 /// Samples that are lost in a row, as many as a patient board bears, and no other trouble.
-fn gap(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
-    setting.rig = RigName::Paper;
-    setting.law = pick(rng, &laws::STEADY, laws::LED);
-    setting.path = PathKind::Ramp(pick(rng, &[2.0, 5.0, 10.0, 20.0, 28.0], 20.0));
-    if matches!(setting.safe, Safe::Release) {
-        setting.safe = Safe::Hold(9.99);
+fn gap(rng: &mut Pcg64, healthy: &mut HealthyRun, troubles: &mut Vec<Trouble>) {
+    healthy.rig = RigName::Paper;
+    healthy.law = pick(rng, &laws::STEADY, laws::LED);
+    healthy.path = PathKind::Ramp(pick(rng, &[2.0, 5.0, 10.0, 20.0, 28.0], 20.0));
+    if matches!(healthy.safe, Safe::Release) {
+        healthy.safe = Safe::Hold(9.99);
     }
-    (setting.delay, setting.observer, setting.cycles) = (0, false, 20);
+    (healthy.delay, healthy.observer, healthy.cycles) = (0, false, 20);
     let gap = Trouble {
-        periods: Some(rng.random_range(2..=LONGEST_GAP)),
+        periods: Some(rng.random_range(2..=laws::LONGEST_GAP)),
         often: 1.0,
-        ..trouble(rng, setting, |_, _| What::Fault(FaultKind::Drop, Direction::Up))
+        ..trouble(rng, healthy, |_, _| What::Fault(FaultKind::Drop, Direction::Up))
     };
     // Before the first sample there is nothing to reckon from.
     *troubles = vec![Trouble { at: gap.at.max(0.15), ..gap }];
 }
 
 /// A few of them, where the velocity is an observer's: it has to be led over them.
-fn gap_in_an_observer(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
-    gap(rng, setting, troubles);
-    (setting.law, setting.observer) = (laws::LED, true);
-    setting.path = PathKind::Ramp(pick(rng, &[28.0, 40.0], 28.0));
+fn gap_in_an_observer(rng: &mut Pcg64, healthy: &mut HealthyRun, troubles: &mut Vec<Trouble>) {
+    gap(rng, healthy, troubles);
+    (healthy.law, healthy.observer) = (laws::LED, true);
+    healthy.path = PathKind::Ramp(pick(rng, &[28.0, 40.0], 28.0));
     for gap in troubles {
         gap.periods = Some(rng.random_range(2..=2 * LED_OVER));
     }
@@ -383,30 +281,27 @@ fn gap_in_an_observer(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec
 /// Samples over which an observer is led without a jump of the voltage; of more nothing is promised.
 pub(super) const LED_OVER: u32 = 2;
 
-/// Samples that a steady law on a ramp can do without, one after another.
-pub(super) const LONGEST_GAP: u32 = 12;
-
 /// Number of the places at which trouble may be.
 const PLACES: usize = 6;
 
 /// Trouble at any place.
-fn any(rng: &mut Pcg64, setting: &Setting) -> What {
+fn any(rng: &mut Pcg64, healthy: &HealthyRun) -> What {
     match rng.random_range(0..PLACES) {
         0 | 1 => line(rng),
         2 => What::Fault(encoder(rng), Direction::Both),
-        3 => What::Fault(converter(rng, setting), Direction::Both),
+        3 => What::Fault(converter(rng, healthy), Direction::Both),
         4 => What::Fault(board(rng), Direction::Both),
         _ => inside(rng),
     }
 }
 
-fn trouble(rng: &mut Pcg64, setting: &Setting, what: impl Fn(&mut Pcg64, &Setting) -> What) -> Trouble {
-    let (from, to) = match setting.path {
+fn trouble(rng: &mut Pcg64, healthy: &HealthyRun, what: impl Fn(&mut Pcg64, &HealthyRun) -> What) -> Trouble {
+    let (from, to) = match healthy.path {
         PathKind::MinimumJerk(_) => (0.5, 1.2),
         PathKind::Ramp(_) | PathKind::Sine(_) => (0.15, 0.5),
     };
     let mut at = rng.random_range(from..to);
-    let what = what(rng, setting);
+    let what = what(rng, healthy);
     let faults = matches!(what, What::Fault(..));
     let stays = needs_time(what) || matches!(what, What::Fault(FaultKind::Lever, _));
     // Armed, and not running yet.
@@ -476,8 +371,8 @@ fn encoder(rng: &mut Pcg64) -> FaultKind {
     }
 }
 
-fn converter(rng: &mut Pcg64, setting: &Setting) -> FaultKind {
-    let low = if setting.rig == RigName::Motor { -9.99 } else { 0.0 };
+fn converter(rng: &mut Pcg64, healthy: &HealthyRun) -> FaultKind {
+    let low = if healthy.rig == RigName::Motor { -9.99 } else { 0.0 };
     match rng.random_range(0..6) {
         0 => FaultKind::DacStuck(StuckAt::Volts(0.0)),
         1 => FaultKind::DacStuck(StuckAt::Last),

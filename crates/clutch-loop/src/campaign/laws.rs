@@ -2,14 +2,14 @@
 //!
 //! A law of the list that has no row is drawn all the same, with its own gains, and held to the promises of all.
 
-use super::grammar::{LONGEST_GAP, RigName, Setting};
+use super::healthy_run::{HealthyRun, RigName};
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 
 /// Differences of a law from others.
 pub(super) struct OfLaw {
     /// Its keys on a brake.
-    pub(super) brake: fn(&Setting) -> String,
+    pub(super) brake: fn(&HealthyRun) -> String,
     /// Its keys on a motor axis.
     pub(super) motor: &'static str,
     /// True if it bears a period of delay on the paper's rig: under PD that is unstable, and laws that switch swing.
@@ -74,6 +74,9 @@ pub(super) fn drawn_later() -> Vec<&'static str> {
 
 /// The steady laws, as often as they are drawn where samples are lost.
 pub(super) const STEADY: [&str; 4] = ["pd", "ctc", "ctc", "smc"];
+
+/// Samples that a steady law on a ramp can do without, one after another.
+pub(super) const LONGEST_GAP: u32 = 12;
 
 /// The law whose kick over lost samples is promised where an observer is led over them.
 pub(super) const LED: &str = "smc";

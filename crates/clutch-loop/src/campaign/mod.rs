@@ -5,6 +5,7 @@
 //! first seeds, and show that it fails when any one of the supervisor's checks is taken out.
 
 pub mod grammar;
+mod healthy_run;
 mod laws;
 pub mod oracle;
 pub mod table;
@@ -22,7 +23,8 @@ use clutch_core::{OnDisc, Planned, Real, Servo};
 use clutch_node::ControllerNode;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError};
-use grammar::{Draw, PLAIN, PathKind, RigName, SINE_DEG_PER_DEG_S, Safe, Setting, What};
+use grammar::{Draw, HealthyRun, PLAIN, PathKind, RigName, Safe, What};
+use healthy_run::SINE_DEG_PER_DEG_S;
 use std::fmt::{self, Write as _};
 use std::str::FromStr;
 
@@ -114,12 +116,12 @@ const AFTER: (f64, f64) = (0.6, 1.8);
 const WATCHED: f64 = 0.25;
 
 impl Draw {
-    /// The scenario of the setting.
+    /// The scenario of the healthy run.
     ///
     /// # Errors
     /// None, unless the grammar is wrong.
     pub fn scenario(&self, seed: u64) -> Result<Scenario, ScenarioError> {
-        let s = &self.setting;
+        let s = &self.healthy;
         let mut text = match s.rig {
             RigName::Motor => self.motor(),
             RigName::Paper | RigName::Bench => self.brake(),
@@ -157,7 +159,7 @@ impl Draw {
 
     /// Rig, law, path and bounds of a brake.
     fn brake(&self) -> String {
-        let s = &self.setting;
+        let s = &self.healthy;
         let rig = if s.rig == RigName::Bench { "bench" } else { "paper" };
         let mut text = format!("name = \"campaign\"\n[rig]\nbase = \"{rig}\"\ndelay_ticks = {}\n", s.delay);
         if let Some((factor, at)) = self.load() {
@@ -199,7 +201,7 @@ impl Draw {
 
     /// A geared motor axis with friction, to and fro; as the built-in ones.
     fn motor(&self) -> String {
-        let Setting { law, path, wide, .. } = self.setting;
+        let HealthyRun { law, path, wide, .. } = self.healthy;
         let gains = laws::of(law).motor;
         let amplitude = path.top_deg_s() / (std::f64::consts::TAU * MOTOR_HZ);
         let axis = |of: &str| {
@@ -236,7 +238,7 @@ impl Draw {
     #[must_use]
     pub fn is_outside(&self) -> bool {
         let inside = |what| matches!(what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge);
-        self.setting.single && !self.setting.observer && !self.troubles.iter().any(|t| inside(t.what))
+        self.healthy.single && !self.healthy.observer && !self.troubles.iter().any(|t| inside(t.what))
     }
 
     /// Runs it against a board that closes the loop.
@@ -265,7 +267,7 @@ impl Draw {
         let last = self.troubles.iter().map(|t| t.at).fold(0.0, f64::max);
         let after = if self.troubles.iter().any(grammar::Trouble::needs_time) { AFTER.1 } else { AFTER.0 };
         VirtualOptions {
-            latency_ns: self.setting.latency_ns,
+            latency_ns: self.healthy.latency_ns,
             seed,
             record,
             duration: last + after,

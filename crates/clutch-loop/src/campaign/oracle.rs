@@ -3,7 +3,7 @@
 //! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
 //! `docs/safety.md`.
 
-use super::grammar::{Draw, LED_OVER, PathKind, RigName, Safe, Setting, Trouble, What, follows};
+use super::grammar::{Draw, HealthyRun, LED_OVER, PathKind, RigName, Safe, Trouble, What, follows};
 use super::laws;
 use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
 use crate::virtual_time::VirtualReport;
@@ -39,19 +39,19 @@ pub struct Promise {
 
 /// Error at rest that ends control in a run, °.
 #[must_use]
-pub fn following_deg(s: &Setting) -> f64 {
+pub fn following_deg(s: &HealthyRun) -> f64 {
     laws::of(s.law).following_deg
 }
 
 /// Samples that may be lost in a row where the law leaves its brake about where it is right: on a ramp, without delay.
-fn steady(s: &Setting) -> Option<u32> {
+fn steady(s: &HealthyRun) -> Option<u32> {
     let ramp = matches!(s.path, PathKind::Ramp(_));
     let here = ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer;
     laws::of(s.law).steady.filter(|_| here)
 }
 
 /// Periods in which frames may be lost without an end; both ways they are another period's. A law that is steady bears more.
-fn borne(s: &Setting, way: Direction) -> u32 {
+fn borne(s: &HealthyRun, way: Direction) -> u32 {
     let patient = (s.cycles - 2).min(steady(s).unwrap_or(3));
     match way {
         Direction::Up => patient,
@@ -65,7 +65,7 @@ fn borne(s: &Setting, way: Direction) -> u32 {
 /// and an observer that was led over them, sliding mode has little to correct. One that was not takes the way of several
 /// periods for that of one.
 fn kick(draw: &Draw) -> Option<f64> {
-    let s = &draw.setting;
+    let s = &draw.healthy;
     let [Trouble { what: What::Fault(FaultKind::Drop, Direction::Up), periods: Some(lost), often, at }] =
         draw.troubles[..]
     else {
@@ -78,15 +78,15 @@ fn kick(draw: &Draw) -> Option<f64> {
 }
 
 /// A trouble of an encoder that is found by the way of the shaft: time for which it may be open.
-fn by_the_way(s: &Setting) -> f64 {
+fn by_the_way(s: &HealthyRun) -> f64 {
     let bounds = if s.wide || s.rig == RigName::Bench { 2.0 } else { 1.0 };
     (0.012 + 0.001 * f64::from(s.delay)) * bounds
 }
 
 impl Promise {
-    /// The outcome that one trouble in a setting may have.
+    /// The outcome that one trouble in a healthy run may have.
     #[must_use]
-    pub fn of(s: &Setting, t: &Trouble) -> Promise {
+    pub fn of(s: &HealthyRun, t: &Trouble) -> Promise {
         let watchdog = f64::from(s.cycles) * PERIOD;
         let base = Promise {
             fate: Fate::Either,
@@ -122,7 +122,7 @@ impl Promise {
 }
 
 /// Frames that are lost, late, twice, altered or forged.
-fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promise) -> Promise {
+fn line(s: &HealthyRun, t: &Trouble, kind: FaultKind, way: Direction, base: &Promise) -> Promise {
     let watchdog = f64::from(s.cycles) * PERIOD;
     let ends = |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..*base };
     let goes_on = Promise { fate: Fate::GoesOn, ..*base };
@@ -181,7 +181,7 @@ fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promis
 }
 
 /// Encoder, converter and clock of the board.
-fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promise {
+fn hardware(s: &HealthyRun, t: &Trouble, kind: FaultKind, base: &Promise) -> Promise {
     let ends = |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..*base };
     let (stays, always) = (t.periods.is_none() && t.often >= 1.0, t.often >= 1.0);
     let law = laws::of(s.law);
@@ -247,7 +247,7 @@ const SEEN: f64 = 0.0063 + 3.0 * PERIOD;
 ///
 /// The filter of the rate lags by 4 periods, so that each burst of 9.995 V goes on until the shaft is 17.5 °/s slower than its path, or
 /// at rest, and 0.05° behind it; in a fall the rate that the law sees is by those 4 periods behind.
-fn catches_up(s: &Setting) -> f64 {
+fn catches_up(s: &HealthyRun) -> f64 {
     const SLOWER_DEG_S: f64 = 17.5;
     const BEHIND_DEG: f64 = 0.05;
     const SLOPE: f64 = 70.0;
@@ -262,7 +262,7 @@ fn catches_up(s: &Setting) -> f64 {
 }
 
 /// A brake that does not press, whatever it is told to.
-fn nothing_presses(s: &Setting, t: &Trouble, blind: &Promise) -> Promise {
+fn nothing_presses(s: &HealthyRun, t: &Trouble, blind: &Promise) -> Promise {
     // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
     let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
     // An open brake that nobody has told to press shows nothing: it has to be told, and then to be seen. The sign function
@@ -274,7 +274,7 @@ fn nothing_presses(s: &Setting, t: &Trouble, blind: &Promise) -> Promise {
 }
 
 /// Counts that are off by more than a shaft can be.
-fn jump(s: &Setting, t: &Trouble, way: &Promise) -> Promise {
+fn jump(s: &HealthyRun, t: &Trouble, way: &Promise) -> Promise {
     let ends = |within: f64| Promise { fate: Fate::Ends(within), causes: &[Cause::Jump], ..*way };
     let refused = t.periods.unwrap_or(u32::MAX);
     if refused <= 2 && refused + s.good_samples < s.cycles {
@@ -290,7 +290,7 @@ fn jump(s: &Setting, t: &Trouble, way: &Promise) -> Promise {
 
 /// A clock that is fast or slow by a factor, its periods so many times as long: 5 % of the time so far and a slack, which is
 /// four times the patience with a silent line.
-fn clock(s: &Setting, t: &Trouble, factor: f64, longer: f64, blind: &Promise) -> Promise {
+fn clock(s: &HealthyRun, t: &Trouble, factor: f64, longer: f64, blind: &Promise) -> Promise {
     let share = (factor - 1.0).abs() - 0.05;
     let slack = (4.0 * PERIOD * f64::from(s.cycles)).max(0.03);
     let within = (0.05 * (t.at + 0.1) + slack) / share * longer.max(1.0);
@@ -301,7 +301,7 @@ fn clock(s: &Setting, t: &Trouble, factor: f64, longer: f64, blind: &Promise) ->
 ///
 /// A few lines of Euler's method, with a brake that grips a tenth less and a weight that pulls a tenth more than the rig's.
 #[must_use]
-pub fn beyond_deg(s: &Setting, blind: f64) -> Option<f64> {
+pub fn beyond_deg(s: &HealthyRun, blind: f64) -> Option<f64> {
     const STEP: f64 = 1e-4;
     let (grip, pull) = match s.rig {
         RigName::Paper => (0.14 * 0.15, 0.0471),
@@ -337,7 +337,7 @@ pub fn beyond_deg(s: &Setting, blind: f64) -> Option<f64> {
 }
 
 /// Healthy error of a run, °: what its law and its path leave.
-fn healthy_deg(s: &Setting) -> f64 {
+fn healthy_deg(s: &HealthyRun) -> f64 {
     let uneven = if s.rig == RigName::Bench { 0.3 } else { 0.0 };
     laws::of(s.law).healthy_deg + uneven + 0.012 * s.path.top_deg_s()
 }
@@ -345,7 +345,7 @@ fn healthy_deg(s: &Setting) -> f64 {
 /// Checks that a report keeps the promises of its draw; says what is wrong if not.
 #[must_use]
 pub fn judge(draw: &Draw, o: &VirtualReport) -> Option<String> {
-    let s = &draw.setting;
+    let s = &draw.healthy;
     // A dead controller is seen by the board's clock alone: where that stands still, only a watchdog in hardware acts.
     let has = |what: fn(&What) -> bool| draw.troubles.iter().any(|t| what(&t.what));
     if has(|what| *what == What::ControllerDies)
@@ -359,7 +359,7 @@ pub fn judge(draw: &Draw, o: &VirtualReport) -> Option<String> {
 
 /// The output: within its limits, and in the end that of the safe state.
 fn output(draw: &Draw, o: &VirtualReport) -> Option<String> {
-    let s = &draw.setting;
+    let s = &draw.healthy;
     let (low, high) = if s.rig == RigName::Motor { (-10.0, 10.0) } else { (0.0, 10.0) };
     if o.answers > 0 && (o.volts.0 < low - 1e-9 || o.volts.1 > high) {
         return Some(format!("commanded {} to {} V, outside of {low} to {high} V", o.volts.0, o.volts.1));
@@ -383,7 +383,7 @@ fn output(draw: &Draw, o: &VirtualReport) -> Option<String> {
 
 /// The fate of control, and its cause.
 fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> {
-    let (s, alone) = (&draw.setting, promises.len() <= 1);
+    let (s, alone) = (&draw.healthy, promises.len() <= 1);
     if promises.iter().all(|p| p.fate == Fate::GoesOn) && alone {
         if let Some(cause) = o.cause {
             return Some(format!("ended by {cause:?} although it can be borne"));
@@ -471,7 +471,7 @@ fn hits(t: &Trouble) -> bool {
 }
 
 /// The way of the shaft.
-fn degrees(s: &Setting, promises: &[Promise], o: &VirtualReport) -> Option<String> {
+fn degrees(s: &HealthyRun, promises: &[Promise], o: &VirtualReport) -> Option<String> {
     if s.rig == RigName::Motor || promises.iter().any(|p| p.blind.is_none() && !p.truthful) {
         return None;
     }

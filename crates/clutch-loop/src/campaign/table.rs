@@ -40,7 +40,7 @@ impl Table {
         };
         let row = self.rows.entry(kind).or_default();
         row.runs += 1;
-        let promises: Vec<Promise> = draw.troubles.iter().map(|t| Promise::of(&draw.setting, t)).collect();
+        let promises: Vec<Promise> = draw.troubles.iter().map(|t| Promise::of(&draw.healthy, t)).collect();
         row.must += u64::from(promises.iter().any(|p| matches!(p.fate, Fate::Ends(_))));
         let Some(safe) = report.safe else { return };
         row.ended += 1;
@@ -50,7 +50,7 @@ impl Table {
             *row.times.entry((took.max(0.0) / STEP).round() as u64).or_default() += 1;
         }
         if promises.iter().all(|p| p.blind.is_some())
-            && super::oracle::beyond_deg(&draw.setting, 0.0).is_some()
+            && super::oracle::beyond_deg(&draw.healthy, 0.0).is_some()
         {
             row.beyond = row.beyond.max((report.overrun.to_degrees().max(0.0) * 1e6) as u64);
         }

@@ -1,7 +1,8 @@
 //! A TCP address or a UNIX socket as the end of a simulated board.
 
 use super::pty::wait_or_sleep;
-use super::{Address, ClientEvent, Endpoint, PortError, received, sent};
+use super::results::{received, sent};
+use super::{Address, ClientEvent, Endpoint, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns};
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::net::{

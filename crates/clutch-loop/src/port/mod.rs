@@ -17,17 +17,20 @@
 
 mod address;
 mod device;
+mod endpoint;
 mod error;
 mod listener;
 mod pty;
+mod results;
 
 pub use address::{Address, AddressError, DEFAULT_BAUD};
 pub use device::{DeviceKind, STANDARD_BAUDS, check_baud};
+pub use endpoint::{ClientEvent, Endpoint};
 pub use error::{Holder, PortError};
 pub use listener::{BUSY_LINE, Listener};
 pub use pty::PseudoTerminal;
 
-use crate::realtime::{Readiness, WaitMode};
+use results::{received, sent};
 use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
 use rustix::io::Errno;
@@ -210,43 +213,6 @@ impl AsFd for Port {
     }
 }
 
-/// A read's result: nothing there is `Ok(0)`, the end of the line is `BrokenPipe`.
-fn received(result: rustix::io::Result<usize>) -> io::Result<usize> {
-    match result {
-        Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
-        Ok(count) => Ok(count),
-        Err(Errno::AGAIN | Errno::INTR) => Ok(0),
-        Err(error) => Err(gone(error)),
-    }
-}
-
-/// A write's result: a full buffer is `Ok(0)`.
-fn sent(result: rustix::io::Result<usize>) -> io::Result<usize> {
-    match result {
-        Ok(count) => Ok(count),
-        Err(Errno::AGAIN | Errno::INTR) => Ok(0),
-        Err(error) => Err(gone(error)),
-    }
-}
-
-/// The many ways in which the kernel says that nobody is there any more, as one.
-fn gone(error: Errno) -> io::Error {
-    match error {
-        Errno::IO
-        | Errno::NXIO
-        | Errno::NODEV
-        | Errno::PIPE
-        | Errno::CONNRESET
-        | Errno::CONNABORTED
-        | Errno::SHUTDOWN
-        | Errno::NOTCONN
-        | Errno::TIMEDOUT
-        | Errno::HOSTUNREACH
-        | Errno::NETUNREACH => io::ErrorKind::BrokenPipe.into(),
-        other => other.into(),
-    }
-}
-
 fn open_serial(
     address: &Address,
     path: &Path,
@@ -352,53 +318,6 @@ fn open_unix(address: &Address, path: &Path) -> Result<Opened, PortError> {
     let port =
         Port { fd: stream.into(), kind: DeviceKind::Unix, address: address.clone(), baud: 0, fresh: true };
     Ok(Opened { port, notes: Vec::new() })
-}
-
-/// A client's coming and going, as a board sees it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ClientEvent {
-    /// Somebody opened the line. Bytes that a former client had not read are gone.
-    Connected,
-    /// The client closed the line or died, and its last bytes have been read.
-    Left,
-}
-
-/// The board's end of a line: clients come and go, one at a time.
-pub trait Endpoint {
-    /// Notices clients that came or went, one event per call. Call it regularly, each cycle or
-    /// each few milliseconds; it does not wait. A client that follows another between two calls
-    /// is not distinguished: it is the protocol's greeting that begins a session.
-    ///
-    /// # Errors
-    /// The line itself failed.
-    fn service(&mut self) -> io::Result<Option<ClientEvent>>;
-
-    /// Reads what is there, without waiting. `Ok(0)`: nothing now, or nobody there.
-    ///
-    /// # Errors
-    /// The line itself failed. A client that left is not an error.
-    fn read(&mut self, buf: &mut [u8]) -> io::Result<usize>;
-
-    /// Writes as much as the line takes now, without waiting, and says how much. With nobody
-    /// there, all bytes vanish as on a cable that leads nowhere, and count as written.
-    ///
-    /// # Errors
-    /// The line itself failed. A client that left is not an error.
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
-
-    /// Waits for bytes or for the instant `until_ns` of
-    /// [`monotonic_ns`](crate::realtime::monotonic_ns). With nobody there it waits for that
-    /// instant. Never says `HungUp`.
-    fn wait(&self, until_ns: u64, mode: WaitMode) -> Readiness;
-
-    /// The address at which clients reach it, as they write it.
-    fn address(&self) -> Address;
-
-    /// Closes the connection to the present client, which [`Endpoint::service`] then reports to have left. False where
-    /// there is no connection to close: on a pseudo-terminal, whose clients are programs of this user.
-    fn dismiss(&mut self) -> bool {
-        false
-    }
 }
 
 #[cfg(test)]

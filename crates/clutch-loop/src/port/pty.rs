@@ -1,6 +1,7 @@
 //! A pseudo-terminal as the end of a simulated board.
 
-use super::{Address, ClientEvent, DEFAULT_BAUD, Endpoint, received, sent};
+use super::results::{received, sent};
+use super::{Address, ClientEvent, DEFAULT_BAUD, Endpoint};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, sleep_until, wait_readable};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::{AsFd, OwnedFd};

@@ -1,7 +1,7 @@
 use super::device::{NotSerial, classify, classify_path, set_low_latency, tight_line};
 use super::error::{holder_in, permission_advice, serial_devices};
 use super::*;
-use crate::realtime::{monotonic_ns, wait_readable};
+use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use rustix::process::{Gid, Uid, geteuid};
 use std::fs;
 use std::io::Read;

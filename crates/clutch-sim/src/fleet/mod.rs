@@ -7,8 +7,10 @@
 mod shaft;
 #[cfg(test)]
 mod tests;
+mod told;
 
 pub(crate) use shaft::Begun;
+pub(crate) use told::{Quantity, Told};
 
 use crate::engine::EngineError;
 use crate::lane::MOST_LANES;
@@ -21,6 +23,7 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 use shaft::{Alone, Shaft, path_from_0};
 use std::sync::Arc;
+use told::QUANTITIES;
 
 /// Shafts below which lanes would stay empty: they are faster alone.
 const FEWEST: usize = 3;
@@ -28,48 +31,6 @@ const FEWEST: usize = 3;
 const TOGETHER: usize = 32;
 /// Shafts of a block, at most: few enough for a core's own memory.
 const BLOCK: usize = 256;
-
-/// A number that is reported of a shaft at a sample.
-#[derive(Clone, Copy)]
-pub(crate) enum Quantity {
-    Time,
-    Position,
-    Velocity,
-    Counts,
-    Stuck,
-    Sticks,
-    Voltage,
-    MeasuredError,
-    ErrorRate,
-    TargetCounts,
-    TargetVelocity,
-    TargetAcceleration,
-    LawVoltage,
-}
-
-/// A number for each quantity and each shaft of a block.
-pub(crate) struct Told {
-    shafts: usize,
-    numbers: Vec<f64>,
-}
-
-impl Told {
-    fn new(shafts: usize) -> Self {
-        Told { shafts, numbers: vec![0.0; Fleet::QUANTITIES.len() * shafts] }
-    }
-
-    /// The number of a shaft.
-    #[inline(always)]
-    pub(crate) fn at(&mut self, quantity: Quantity, shaft: usize) -> &mut f64 {
-        &mut self.row(quantity)[shaft]
-    }
-
-    /// The numbers of all shafts.
-    #[inline(always)]
-    pub(crate) fn row(&mut self, quantity: Quantity) -> &mut [f64] {
-        &mut self.numbers[quantity as usize * self.shafts..][..self.shafts]
-    }
-}
 
 /// Shafts that are stepped together.
 ///
@@ -95,21 +56,7 @@ pub struct Fleet {
 impl Fleet {
     /// Names of the quantities that are reported of a shaft at a sample, with units: `sticks` so far, `stuck` is 1 at rest,
     /// `voltage_v` was commanded last, `law_voltage_v` is what the scenario's law answers.
-    pub const QUANTITIES: [&'static str; 13] = [
-        "time_s",
-        "position_rad",
-        "velocity_rad_s",
-        "counts",
-        "stuck",
-        "sticks",
-        "voltage_v",
-        "measured_error_rad",
-        "error_rate_rad_s",
-        "target_counts",
-        "target_velocity_rad_s",
-        "target_acceleration_rad_s2",
-        "law_voltage_v",
-    ];
+    pub const QUANTITIES: [&'static str; 13] = QUANTITIES;
 
     /// A shaft for each seed, which it has for its `run.seed`.
     ///

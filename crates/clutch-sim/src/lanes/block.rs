@@ -1,9 +1,10 @@
 //! A block of runs in lockstep: chunks of as many as a vector has lanes.
 
+use super::candidate::{Candidate, Common};
 use super::elementary::Powers;
-use super::group::{Candidate, Common};
-use super::motion::{Motions, Shafts};
+use super::motion::Motions;
 use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
+use super::shafts::Shafts;
 use super::silence::Silence;
 use super::vector::InLanes;
 use crate::detected::STAIR;

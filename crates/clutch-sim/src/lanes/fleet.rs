@@ -1,7 +1,8 @@
 //! Shafts of a fleet in lanes: motion, and laws where they can.
 
+use super::alike::Alike;
 use super::elementary::Powers;
-use super::motion::{Alike, Motions};
+use super::motion::Motions;
 use super::servo::{FIXED, LaneServos, Sensors, Steered, Targets, beyond};
 use super::vector::{InLanes, at};
 use crate::engine::EngineKind;

@@ -15,12 +15,16 @@
 //! of `libm`. A run or a shaft that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again
 //! alone.
 
+mod alike;
 mod block;
+mod candidate;
 mod elementary;
 pub(crate) mod fleet;
 mod group;
+mod in_steps;
 mod motion;
 mod servo;
+mod shafts;
 mod silence;
 mod steps;
 #[cfg(test)]

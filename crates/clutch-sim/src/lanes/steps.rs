@@ -3,32 +3,14 @@
 //! A step is done for as many motions as a vector has lanes, from any vector of the block, and judged lane by lane, as
 //! alone: each motion has its own steps, and ends when it ends.
 
-use super::motion::{Alike, Begin, Shafts};
-use crate::drive::Drive;
-use crate::engine::dormand_prince::{Course, Outcome, Push, Slip, Step, rounding};
-use crate::engine::{DormandPrince, Engine, Event, EventKind, Input, Model, Motion, Shaft, Volts};
+use super::alike::Alike;
+use super::in_steps::OnTheWay;
+use super::shafts::Shafts;
+use crate::engine::dormand_prince::{Outcome, Push, Slip, Step, rounding};
+use crate::engine::{Event, Model, Motion, Shaft};
 use crate::lane::{Lane, each};
-use crate::rig::Rig;
 use crate::ripple::Ripple;
 use clutch_core::Plant;
-
-/// Shafts that Dormand and Prince's steps move.
-pub(super) struct InSteps<V: Lane> {
-    ripple: Option<Ripple<V>>,
-    /// Time constants of the actuators' lag, s.
-    time_constant: V,
-    /// Voltage at the pads, V.
-    pad: V,
-    /// Lane by lane.
-    alone: Vec<Alone>,
-}
-
-/// A shaft as one that moves alone.
-struct Alone {
-    model: Model,
-    drive: Drive,
-    engine: DormandPrince,
-}
 
 /// Drive of several shafts: a weight each, and a voltage that is held or lags.
 #[derive(Clone, Copy)]
@@ -55,83 +37,6 @@ impl<V: Lane> Push<V> for Steady<V> {
     #[inline(always)]
     fn drive(&self, _: V, _: V) -> V {
         self.drive
-    }
-}
-
-/// A motion between two of its steps.
-pub(super) struct OnTheWay {
-    /// Place of its vector.
-    shafts: usize,
-    lane: usize,
-    course: Course,
-    sign: f64,
-    rounding: f64,
-    /// Torque of the drive, and as the period begins with that of the actuator, N m.
-    drive: f64,
-    torque: f64,
-    /// Voltage at the pad at the sample, and on its way there, V.
-    volts: [f64; 2],
-    time_constant: f64,
-    inverse_inertia: f64,
-    /// It has been stuck until now.
-    breaks_away: bool,
-}
-
-impl OnTheWay {
-    /// Its break-away.
-    fn begins(&self, time: f64, position: f64) -> Event {
-        Event { time, kind: EventKind::BreakAway, position, torque: self.torque }
-    }
-}
-
-impl<V: Lane> InSteps<V> {
-    /// The shafts of rigs as they begin, one for each lane.
-    pub(super) fn of(rigs: &[Begin<'_>]) -> Self {
-        let alone: Vec<Alone> = rigs.iter().map(|(moving, _)| Alone::of(moving.rig())).collect();
-        let discs: Option<Vec<&Ripple>> = alone.iter().map(|a| a.model.ripple.as_ref()).collect();
-        let lag = |i: usize| rigs[i].0.rig().params.actuator_time_constant.unwrap_or(1.0);
-        InSteps {
-            ripple: discs.and_then(|discs| Ripple::in_lanes(&discs)),
-            time_constant: V::of(lag),
-            pad: V::of(|i| rigs[i].1),
-            alone,
-        }
-    }
-
-    /// A lane begins anew, with a rig of the same scenario.
-    pub(super) fn begin_anew(&mut self, lane: usize, (moving, volts): Begin<'_>) {
-        self.pad.put(lane, volts);
-        self.alone[lane] = Alone::of(moving.rig());
-        if let Some(ripple) = &mut self.ripple {
-            ripple.take(|i| self.alone[i].model.ripple.as_ref());
-        }
-    }
-}
-
-impl Alone {
-    fn of(rig: &Rig) -> Self {
-        let Rig { model, drive, .. } = rig;
-        Alone { model: model.clone(), drive: drive.clone(), engine: DormandPrince::default() }
-    }
-
-    /// Its engine moves it through the interval that begins at `time`, s.
-    fn moves(
-        &mut self,
-        time: f64,
-        alike: &Alike,
-        ([from, to], time_constant): ([f64; 2], f64),
-        shaft: &mut Shaft,
-        events: &mut Vec<Event>,
-        begun: Option<(Course, f64)>,
-    ) -> bool {
-        let volts = if alike.lags { Volts::Lag { from, to, time_constant } } else { Volts::Held(to) };
-        let Alone { model, drive, engine } = self;
-        let input = Input { time, duration: alike.period, origin: 0.0, volts, drive, noise: 0.0 };
-        match begun {
-            Some(_) => engine.follow(model, &input, shaft, events, begun),
-            None => engine.advance(model, &input, shaft, events),
-        }
-        .is_ok()
     }
 }
 

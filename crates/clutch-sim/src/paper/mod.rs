@@ -8,6 +8,7 @@
 
 mod claim;
 mod figures;
+mod law;
 mod measure;
 mod runs;
 mod statements;
@@ -15,51 +16,15 @@ mod table3;
 
 pub use claim::Claim;
 pub use figures::{FigureData, PanelData};
+pub use law::PaperLaw;
 pub use measure::{Agrees, Kind, Measure};
-pub use runs::Source;
+pub use runs::{SEEDS, Source};
 pub use statements::{Place, STATEMENTS, Statement};
 pub use table3::{TABLE3, Table3Row, reduction};
 
 use crate::progress::Report;
 use crate::run::RunError;
-use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams};
 use runs::Runs;
-
-/// Seeds of every run.
-pub const SEEDS: [u64; 10] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
-
-/// The three laws of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum PaperLaw {
-    /// (4)
-    Pd,
-    /// (11)
-    Ctc,
-    /// (31)
-    Smc,
-}
-
-impl PaperLaw {
-    /// With the gains of Table 2.
-    #[must_use]
-    pub fn params(self) -> LawParams {
-        match self {
-            PaperLaw::Pd => LawParams::Pd(PdParams::default()),
-            PaperLaw::Ctc => LawParams::Ctc(CtcParams::default()),
-            PaperLaw::Smc => LawParams::Smc(SmcParams::default()),
-        }
-    }
-
-    /// As the paper calls it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            PaperLaw::Pd => "PD controller",
-            PaperLaw::Ctc => "computed-torque controller",
-            PaperLaw::Smc => "sliding-mode controller",
-        }
-    }
-}
 
 /// Everything that `clutch reproduce` shows.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The runs behind figures, table and statements.
 
-use super::{PaperLaw, SEEDS};
+use super::law::PaperLaw;
 use crate::metrics::{Detected, Figure, Metrics};
 use crate::progress::{Progress, Report};
 use crate::rig::RigParams;
@@ -10,6 +10,9 @@ use clutch_core::reference::ReferenceParams;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
+
+/// Seeds of every run.
+pub const SEEDS: [u64; 10] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
 
 /// The rig on which a shaft runs: the two columns of each figure, and the check on what CTC could do if
 /// friction were known.

@@ -1,6 +1,7 @@
 //! A case as its file has it, checked.
 
-use super::mechanism::Mechanism;
+use super::mechanism::{Mechanism, Row};
+use super::model::{Model, ScenarioCase};
 use super::observe::Observe;
 use super::signal::Signal;
 use super::unposed::unposed;
@@ -54,41 +55,6 @@ pub struct Case {
     pub still: Option<f64>,
     /// The expectations.
     pub expect: Vec<Expect>,
-}
-
-/// The moving part of a case.
-#[derive(Clone, Debug)]
-pub enum Model {
-    /// A linear mechanism with rows of friction.
-    Mechanism(Mechanism),
-    /// A built-in scenario with changes: shaft, encoder, law, converter.
-    Scenario(ScenarioCase),
-}
-
-/// A scenario of a case.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ScenarioCase {
-    /// Name of a built-in scenario.
-    pub name: String,
-    /// Keys and values over it, as `--set` takes them.
-    #[serde(default)]
-    pub set: Vec<(String, String)>,
-}
-
-/// A row of friction.
-#[derive(Clone, Debug)]
-pub struct Row {
-    /// `J_i`: what of each joint's velocity is its slip rate.
-    pub joints: Vec<f64>,
-    /// Velocity of what it rubs on, rad/s or m/s.
-    pub base_velocity: f64,
-    /// Normal force, as torque (force) per unit of μ.
-    pub normal: Signal,
-    /// Its friction.
-    pub friction: Friction<f64>,
-    /// Name of that model, and its parameters by their keys.
-    pub told: (String, toml::Table),
 }
 
 /// One expectation.

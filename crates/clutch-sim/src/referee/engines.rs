@@ -1,7 +1,8 @@
 //! The engines of this crate before the referee.
 
-use super::case::{Case, CaseError, Model, Row, ScenarioCase};
-use super::mechanism::{Mechanism, Padded};
+use super::case::{Case, CaseError};
+use super::mechanism::{Mechanism, Padded, Row};
+use super::model::{Model, ScenarioCase};
 use super::trajectory::{Trajectory, TrajectoryEvent};
 use crate::drive::{Drive, RampDrive};
 use crate::engine::rosenbrock::Linear;

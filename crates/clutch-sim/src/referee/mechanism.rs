@@ -1,10 +1,24 @@
 //! A linear mechanism with rows of friction, as the cases describe it.
 
-use super::case::Row;
 use super::signal::Signal;
 use crate::system::System;
 use clutch_core::Friction;
 use nalgebra::{SMatrix, SVector};
+
+/// A row of friction.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// `J_i`: what of each joint's velocity is its slip rate.
+    pub joints: Vec<f64>,
+    /// Velocity of what it rubs on, rad/s or m/s.
+    pub base_velocity: f64,
+    /// Normal force, as torque (force) per unit of μ.
+    pub normal: Signal,
+    /// Its friction.
+    pub friction: Friction<f64>,
+    /// Name of that model, and its parameters by their keys.
+    pub told: (String, toml::Table),
+}
 
 /// `M v̇ = load(t) − K q − D v − Σ J_iᵀ T_i`.
 #[derive(Clone, Debug)]

@@ -11,16 +11,20 @@
 
 mod case;
 mod engines;
+mod judge;
 mod mechanism;
+mod model;
 mod observe;
 mod signal;
 mod trajectory;
 mod unposed;
 
-pub use case::{Case, CaseError, Expect, Model, Row, ScenarioCase};
+pub use case::{Case, CaseError, Expect};
 pub use engines::{ENGINES, RefereeEngine, RefereeError, run};
-pub use mechanism::Mechanism;
-pub use observe::{Observe, Verdict};
+pub use judge::Verdict;
+pub use mechanism::{Mechanism, Row};
+pub use model::{Model, ScenarioCase};
+pub use observe::Observe;
 pub use signal::{Signal, Term};
 pub use trajectory::{Trajectory, TrajectoryEvent};
 

@@ -1,6 +1,7 @@
 //! The motion that an engine made of a case.
 
-use crate::referee::{Case, CaseError, Model};
+use super::case::{Case, CaseError};
+use super::model::Model;
 
 /// A row that began to hold or to slip.
 #[derive(Clone, Copy, Debug, PartialEq)]

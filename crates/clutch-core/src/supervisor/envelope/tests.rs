@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::law::{LawParams, PdParams};
-use crate::supervisor::{LimitParams, SpeedLimit, SupervisorParams, params::Limits};
+use crate::supervisor::{LimitParams, SpeedLimit, SupervisorParams, limits::Limits};
 use crate::{ActuatorParams, BothActuator, BrakeActuator, MotorActuator, PlantParams, SafeState, Tolerances};
 use crate::{Encoder, ServoParams};
 use proptest::prelude::*;

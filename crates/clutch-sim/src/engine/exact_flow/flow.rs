@@ -1,10 +1,9 @@
 //! The pieces of a motion: linear, at the fringe of the layer, and through it.
 
-use super::series::{self, INVERSE};
+use super::series::{self, INVERSE, TOLERANCE};
+use super::state::State;
 use crate::lane::Lane;
 
-/// Part that a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
-pub(super) const TOLERANCE: f64 = 1e-10;
 /// Share of `q` in the rate of speed below which first order is enough: the second is its square.
 const FRINGE: f64 = 1e-5;
 /// Way of a quadrature in the middle of the layer, in Stribeck velocities.
@@ -42,48 +41,6 @@ pub(crate) struct Flow<V> {
     pub(crate) stribeck: V,
     /// Speed above which `q` is lost in rounding.
     pub(crate) edge: V,
-}
-
-/// A state within an interval.
-#[derive(Clone, Copy)]
-pub(crate) struct State<V> {
-    /// Since the begin of the interval, s.
-    pub(crate) time: V,
-    /// `s`.
-    pub(crate) speed: V,
-    /// `φ`, 1/s, as the last piece left it: more than the speed gives. NaN where no piece did.
-    pub(crate) rate: V,
-    /// `∫ s dt`, s.
-    pub(crate) way: V,
-}
-
-impl<V: Lane> State<V> {
-    /// The begin of an interval.
-    #[inline(always)]
-    pub(crate) fn at(speed: V) -> Self {
-        State { time: V::ZERO, speed, rate: V::splat(f64::NAN), way: V::ZERO }
-    }
-
-    /// The state of one lane.
-    pub(crate) fn lane(&self, i: usize) -> State<f64> {
-        State {
-            time: self.time.lane(i),
-            speed: self.speed.lane(i),
-            rate: self.rate.lane(i),
-            way: self.way.lane(i),
-        }
-    }
-
-    /// `a` where the mask is true, `b` elsewhere.
-    #[inline(always)]
-    pub(crate) fn select(mask: V::Mask, a: &Self, b: &Self) -> Self {
-        State {
-            time: V::select(mask, a.time, b.time),
-            speed: V::select(mask, a.speed, b.speed),
-            rate: V::select(mask, a.rate, b.rate),
-            way: V::select(mask, a.way, b.way),
-        }
-    }
 }
 
 /// `(1 − e^{−x})/x` and `(x − 1 + e^{−x})/x²`, for `x ≥ 0`.

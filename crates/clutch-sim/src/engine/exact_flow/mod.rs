@@ -23,8 +23,10 @@
 
 mod flow;
 mod series;
+mod state;
 
-pub(crate) use flow::{Flow, PIECE_LIMIT, Piece, State};
+pub(crate) use flow::{Flow, PIECE_LIMIT, Piece};
+pub(crate) use state::State;
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts};
 use crate::lane::Lane;

@@ -1,8 +1,10 @@
 //! A piece of the motion as power series in time.
 
-use super::flow::{State, TOLERANCE};
+use super::state::State;
 use crate::lane::{Lane, each};
 
+/// Part that a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
+pub(super) const TOLERANCE: f64 = 1e-10;
 /// Terms of a power series.
 const TERMS: usize = 18;
 /// Longest step of a series, in Stribeck velocities: beyond, `e^(−s)` would need more terms.
