@@ -3,8 +3,9 @@
 use crate::harness::{
     alone, beside_others, clutch, folder, program, read_log, replays_identically, run, start,
 };
-use clutch_log::{LogWriter, Record, channel_table};
+use clutch_log::{CommandRecord, LogWriter, Record, channel_table};
 use clutch_sim::Scenario;
+use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,6 +14,44 @@ use std::process::Command;
 fn the_docs_have_the_channel_table_of_the_code() {
     let docs = include_str!("../../docs/log.md");
     assert!(docs.contains(channel_table().trim_end()), "docs/log.md lacks:\n{}", channel_table());
+}
+
+/// Logs that commit 7612aad wrote, before each parameter was declared once.
+const FORMER: [&str; 4] = ["pd_2", "ctc_2", "smc_2", "bench_smc_2"];
+
+#[test]
+fn a_former_log_is_read_gives_the_same_bits_under_its_scenario_and_names_its_old_key() {
+    for name in FORMER {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("loop/former").join(name).with_extension("mcap");
+        let log = read_log(&path);
+        assert!(log.samples.len() == 100 && log.commands.len() == 100, "{name}");
+        let built_in = BUILT_IN.iter().find(|built_in| built_in.name == name).unwrap();
+        let replayed = |set: &[(&str, &str)]| {
+            let set: Vec<_> = set.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+            let scenario = Scenario::parse(name, built_in.toml, &set).unwrap();
+            clutch_loop::replay::replay(&log, &scenario, UNWATCHED).unwrap()
+        };
+        let run_of = [("run.duration_s", "0.1"), ("run.settle_s", "0.02")];
+        let replay = replayed(&run_of);
+        assert_eq!(replay.commands.len(), 100, "{name}");
+        for (logged, again) in log.commands.iter().zip(&replay.commands) {
+            // A law may have had a term more: PD its demand.
+            let common = again.terms.len().min(logged.terms.len());
+            let bits = |c: &CommandRecord| {
+                let target = [c.target_position, c.target_velocity, c.target_acceleration];
+                let law = [c.voltage, c.demand, c.error, c.error_rate];
+                let reals = target.iter().chain(&law).chain(&c.terms[..common]);
+                (c.tick, c.code, c.limit, reals.map(|x| x.to_bits()).collect::<Vec<_>>())
+            };
+            assert_eq!(bits(logged), bits(again), "{name}");
+        }
+        // Another filter gives other bits.
+        let other = replayed(&[run_of[0], run_of[1], ("velocity.smoothed_derivative.smoothing", "0.7")]);
+        assert!(other.first.is_some(), "{name}");
+        let refused = run(&["replay", path.to_str().unwrap()]);
+        refused.expect(1).says(&["rig.brake_gain_nm_v", "did you mean rig.actuator.brake.gain_nm_v?"]);
+    }
 }
 
 #[test]

@@ -170,7 +170,7 @@ fn a_release_test_that_cannot_be_is_refused_only_if_it_was_asked_for() {
         let refusal =
             Session::new(scenario("board_smc_2", &[]), SessionOptions { release_way: way, ..options() });
         let text = refusal.unwrap_err().to_string();
-        assert!(text.contains("expected above 0 and at most 10"), "{way}: {text}");
+        assert!(text.contains("expected a number above 0 and at most 10 °"), "{way}: {text}");
     }
 }
 
