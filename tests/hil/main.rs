@@ -111,7 +111,7 @@ fn ten_seeds_of_the_papers_laws_on_the_board_are_the_simulation_bit_for_bit() {
     }
 }
 
-/// The built-in motor axes to and fro, and a brake with a motor, in single precision.
+/// The built-in motor axes to and fro, in single precision.
 #[test]
 fn motors_on_the_board_are_the_simulation_bit_for_bit() {
     let Some(image) = image("mps2-controller") else { return };

@@ -37,7 +37,7 @@ pub(crate) fn folder(name: &str) -> PathBuf {
 }
 
 /// A text without its lines, which are broken between words.
-fn flat(text: &str) -> String {
+pub(crate) fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

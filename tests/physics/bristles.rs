@@ -5,7 +5,7 @@
 
 use clutch_core::friction::{
     Bend, CoulombParams, DahlParams, ELEMENTS, ElastoPlasticParams, FrictionModel, FrictionParams,
-    LugreParams, MaxwellParams,
+    LugreParams, MaxwellParams, StribeckParams,
 };
 use clutch_core::{ActuatorParams, Bristles, Friction, Plant, PlantParams};
 use clutch_sim::drive::{Drive, DriveParams, RampDrive, SineDrive};
@@ -279,13 +279,45 @@ fn a_run_does_not_depend_on_the_periods_in_which_it_is_asked_for() {
     }
 }
 
-#[test]
-fn over_many_random_programs_of_velocity_friction_takes_energy_and_never_gives_it() {
+/// Numbers from 0 to 1.
+fn numbers() -> impl FnMut() -> f64 {
     let mut seed = 1_u64;
-    let mut random = move || {
+    move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    }
+}
+
+/// Of a friction of the velocity alone the coefficient goes the way of the velocity: it takes energy at each instant.
+#[test]
+fn over_many_random_programs_of_velocity_a_curve_takes_energy_and_never_gives_it() {
+    let mut random = numbers();
+    for _ in 0..10_000 {
+        let (dynamic, exponent) = (random(), 0.1 + 3.0 * random());
+        let stribeck = StribeckParams {
+            mu_static: 2.0 * random(),
+            mu_dynamic: dynamic,
+            stribeck_velocity: 10.0_f64.powf(-5.0 * random()),
+            stribeck_exponent: exponent,
+        };
+        let coulomb = CoulombParams { mu_static: dynamic + random(), mu_dynamic: dynamic };
+        for params in [FrictionParams::from(stribeck), coulomb.into()] {
+            let friction = Friction::build(&params).unwrap();
+            let mut work = 0.0;
+            for _ in 0..20 {
+                let velocity = (random() - 0.5) * 10.0_f64.powf(-4.0 * random());
+                let done = velocity * friction.coefficient(velocity) * random();
+                assert!(done >= 0.0, "{params:?} at {velocity} rad/s");
+                work += done;
+            }
+            assert!(work > 0.0, "{params:?}");
+        }
+    }
+}
+
+#[test]
+fn over_many_random_programs_of_velocity_friction_takes_energy_and_never_gives_it() {
+    let mut random = numbers();
     let all = [
         FrictionParams::from(lugre()),
         elasto_plastic().into(),

@@ -104,6 +104,9 @@ impl Interval {
 /// Angle within which an interval in parts ends where it ends whole, rad.
 const SAME: f64 = 1e-9;
 
+/// Share within which it has the same velocity: of the largest of 1 rad/s, its speed, and what the drive alone gives it in that time.
+const SAME_VELOCITY: f64 = 1e-9;
+
 /// Follows so many intervals whole and in 2 to 19 parts.
 fn same(
     (count, seed): (u32, u64),
@@ -123,6 +126,15 @@ fn same(
         assert!(
             apart < SAME,
             "{n}, {parts} parts: {apart:e} rad, {:?}, {:?}",
+            interval.model,
+            interval.drive
+        );
+        let plant = interval.model.plant.params();
+        let driven = (plant.drive_torque / plant.inertia * interval.seconds).abs();
+        let faster = (whole.velocity - pieces.velocity).abs();
+        assert!(
+            faster < SAME_VELOCITY * interval.velocity.abs().max(whole.velocity.abs()).max(driven).max(1.0),
+            "{n}, {parts} parts: {faster:e} rad/s, {:?}, {:?}",
             interval.model,
             interval.drive
         );
@@ -161,9 +173,9 @@ fn of_systems<const N: usize, const B: usize>(draw: &mut Draw) -> f64 {
         for k in 1..=parts {
             motion.advance(seconds * f64::from(k) / f64::from(parts), &mut Vec::new()).unwrap();
         }
-        motion.state().position
+        (motion.state().position, motion.state().velocity)
     });
-    (a - b).amax()
+    (a.0 - b.0).amax().max((a.1 - b.1).amax())
 }
 
 /// The same of a system with bristles; its states are `2 N + B`, which a generic function cannot say outside of the crate.
@@ -180,14 +192,14 @@ macro_rules! of_bristled {
                 for k in 1..=parts {
                     motion.advance(seconds * f64::from(k) / f64::from(parts)).unwrap();
                 }
-                motion.state().position
+                (motion.state().position, motion.state().velocity)
             });
-            (a - b).amax()
+            (a.0 - b.0).amax().max((a.1 - b.1).amax())
         }
     };
 }
 
-/// Draws a system and gives back how far apart it ends, rad.
+/// Draws a system and gives back how far apart it ends, rad and rad/s.
 type Apart = fn(&mut Draw) -> f64;
 
 #[test]
@@ -204,7 +216,7 @@ fn motions_of_systems_in_parts_are_the_motions_whole() {
     for (place, (apart, count)) in all.into_iter().enumerate() {
         for n in 0..count {
             let apart = apart(&mut draw);
-            assert!(apart < SAME, "{place}, {n}: {apart:e} rad");
+            assert!(apart < SAME, "{place}, {n}: {apart:e} rad or rad/s");
         }
     }
 }

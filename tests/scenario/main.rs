@@ -492,3 +492,61 @@ proptest! {
         }
     }
 }
+
+/// What cannot work: the rig, what it is told to have, and words of the advice.
+#[test]
+fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
+    let reason = |name: &str, set: &[(&str, &str)]| {
+        let set: Vec<_> = set.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+        Scenario::load(name.as_ref(), &set).unwrap().cannot_follow().unwrap()
+    };
+    for (name, set, advice) in [
+        (
+            "pd_2",
+            ("rig.drive", "{weight = {side = \"backwards\"}}"),
+            "let rig.drive turn the shaft the path's way, or give rig and model a motor",
+        ),
+        (
+            "pd_2",
+            ("rig.drive", "{table = {points_s_nm = [[0.0, 0.0]]}}"),
+            "let rig.drive turn the shaft the path's way",
+        ),
+        (
+            "pd_2",
+            ("rig.drive", "{belt = {stiffness_nm_rad = 0.5, speed_deg_s = -2.0}}"),
+            "let rig.drive turn the shaft the path's way",
+        ),
+        (
+            "pd_2",
+            ("rig.drive", "{weight = {mass_kg = 100.0}}"),
+            "or raise the brake's gain or output.highest_v",
+        ),
+        (
+            "pd_2",
+            ("rig.actuator", "{brake = {gain_nm_v = 0.001}}"),
+            "or raise the brake's gain or output.highest_v",
+        ),
+        (
+            "motor_pid",
+            ("rig.drive", "{weight = {mass_kg = 100.0}}"),
+            "or raise the actuator's gain or output's limits",
+        ),
+        (
+            "motor_pid",
+            ("rig.drive", "{weight = {mass_kg = 100.0, side = \"backwards\"}}"),
+            "or raise the motor's gain or output's limits",
+        ),
+    ] {
+        let found = reason(name, &[set]).unwrap_or_else(|| panic!("{name} with {set:?}: nothing"));
+        assert!(
+            found.starts_with("no voltage keeps this rig's shaft on the path: rig.drive gives ")
+                && found.contains(advice),
+            "{name} with {set:?}: {found}"
+        );
+    }
+    for built_in in clutch_sim::scenario::BUILT_IN {
+        assert_eq!(reason(built_in.name, &[]), None, "{}", built_in.name);
+    }
+    // A weight that is on the edge of what the brake holds: 10 V, μ_s as well as μ_d.
+    assert_eq!(reason("pd_2", &[("rig.drive", "{weight = {mass_kg = 0.9}}")]), None);
+}

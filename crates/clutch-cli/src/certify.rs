@@ -46,6 +46,8 @@ impl Certify {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
+        let rig =
+            scenario.cannot_follow()?.map_or(String::new(), |reason| paragraph(&format!("note: {reason}")));
         let sampled = scenario.sampled(&plan.bounds);
         let bound = match (&self.check, self.sampled) {
             (Some(file), _) => Bound::of_file(&sampled, file)?,
@@ -57,7 +59,7 @@ impl Certify {
         report(
             self.json,
             || json(&whole(&scenario, &sampled, &bound)?),
-            || text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound) + &wrote(&saved),
+            || text(&scenario, &plan, &outside) + &rig + &sampled::lines(&sampled, &bound) + &wrote(&saved),
         )?;
         if let (Some(file), None) = (&self.save, bound.proven()) {
             eprintln!("{}: not written: nothing is proven", file.display());

@@ -64,6 +64,9 @@ pub(crate) struct Summary<'a> {
     as_sampled: String,
     sampled: serde_json::Value,
     rig_outside_bounds: Vec<String>,
+    /// The reason why no voltage keeps the rig's shaft on the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rig_cannot_follow: Option<String>,
     /// The part that a map of the disc had.
     #[serde(skip_serializing_if = "Option::is_none")]
     friction_map: Option<MapInRun>,
@@ -162,6 +165,7 @@ impl<'a> Summary<'a> {
             as_sampled: sampled::short_lines(&as_sampled),
             sampled: sampled::json(&as_sampled, &sampled::Bound::NotLookedFor),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
+            rig_cannot_follow: scenario.cannot_follow()?,
             friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
             bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
                 .lacks_damping(run.trace.start_voltage),
@@ -216,6 +220,9 @@ fn text(s: &Summary<'_>, scenario: &Scenario, run: &Run) -> String {
     let most = largest.iter().copied().fold(0.0, f64::max);
     text += &format!("   |error| of the whole run, up to {} °:\n   {}\n", number(most), bars(&largest, most));
     text += &closely(scenario, run);
+    if let Some(reason) = &s.rig_cannot_follow {
+        text += &paragraph(&format!("note: {reason}"));
+    }
     text += &paragraph(&format!("gains, continuous time: {certified}"));
     text += &s.as_sampled;
     if let Some(reason) = s.detected.reason() {

@@ -669,6 +669,11 @@ impl Course<'_> {
             let does = if plan.bounds.actuator == ActuatorKind::Motor { "drives" } else { "does not hold" };
             remarks.push(format!("note: the board powers up at a voltage that {does} the shaft; set its power-up output to the safe state's"));
         }
+        if is_simulated(hello)
+            && let Some(reason) = scenario.cannot_follow()?
+        {
+            remarks.push(format!("note: {reason}"));
+        }
         if !is_simulated(hello) && plan.bounds.actuator != ActuatorKind::Motor {
             remarks.push(
                 "note: a brake that a motor presses lets go when its power fails; no software changes that"

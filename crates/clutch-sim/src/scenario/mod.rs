@@ -3,6 +3,7 @@
 //! The rig begins as a copy of the one that `rig.base` names; every key in the file overrides
 //! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
 
+mod cannot_follow;
 pub mod describe;
 mod outside;
 mod params;

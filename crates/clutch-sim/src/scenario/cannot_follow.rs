@@ -1,0 +1,90 @@
+//! A rig's drive and actuator against the path: a shaft that no voltage can keep on it.
+
+use super::{Scenario, ScenarioError};
+use crate::number;
+use crate::rig::Rig;
+use crate::ripple::Ripple;
+use clutch_core::{ActuatorKind, Bounds, FixedCounts, Interval, PlantParams, Tolerances};
+
+/// Times of the run that are looked at, at most.
+const LOOKS: u64 = 2000;
+
+/// Departure of the torque at random that is allowed for, in its root mean squares.
+const NOISE: f64 = 4.0;
+
+impl Scenario {
+    /// The reason why the rig's shaft cannot follow the path at any time of the run, and what to change; none if it can at
+    /// some time, or if the law follows no path. The plan asks the same of the believed plant; the rig's drive, actuator and
+    /// friction may be others.
+    ///
+    /// # Errors
+    /// None for a checked scenario.
+    pub fn cannot_follow(&self) -> Result<Option<String>, ScenarioError> {
+        let p = &self.params;
+        if !p.law.follows() {
+            return Ok(None);
+        }
+        let rig = Rig::new(&p.rig, p.run.seed).map_err(|e| self.at("rig", &e))?;
+        let plant = rig.model.plant.params();
+        // Of actuator and friction alone: a model may not have each drive that a rig has.
+        let undriven = PlantParams { drive_torque: 1.0, ..*plant };
+        let mut bounds = Bounds::around(&undriven, &Tolerances::default()).map_err(|e| self.at("rig", &e))?;
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let Interval { low, high } = bounds.friction;
+        bounds.friction = Interval { low: low * (1.0 - swing), high: high * (1.0 + swing) };
+        let (lowest, highest) = (p.output.lowest, p.output.highest);
+        // Torque of actuator and friction at some voltage and some place of the disc, forwards and backwards.
+        let given = [true, false].map(|forwards| {
+            let at = [lowest, 0.0_f64.clamp(lowest, highest), highest].map(|u| bounds.torque(forwards, u));
+            let least = at.iter().fold(f64::INFINITY, |least, torque| least.min(torque.low));
+            (least, at.iter().fold(f64::NEG_INFINITY, |most, torque| most.max(torque.high)))
+        });
+        let path = self.path().map_err(|e| self.at("reference", &e))?;
+        let period = p.sampling.sampling.period.seconds::<f64>();
+        let ticks = self.ticks();
+        let radians = rig.encoder.radians_per_count::<f64>();
+        let noise = NOISE * p.rig.torque_noise;
+        let mut first = None;
+        for tick in (0..ticks).step_by((ticks / LOOKS).max(1) as usize) {
+            let target = path.at(tick);
+            if target.velocity == 0.0 {
+                continue;
+            }
+            let (time, angle) =
+                (tick as f64 * period, target.position.minus::<f64>(FixedCounts(0)) * radians);
+            let drive = rig.drive.torque(time, angle);
+            let asked = plant.inertia * target.acceleration + plant.viscous_damping * target.velocity;
+            let (least, most) = given[usize::from(target.velocity < 0.0)];
+            if asked >= drive - noise + least && asked <= drive + noise + most {
+                return Ok(None);
+            }
+            first.get_or_insert((drive, asked, least, most));
+        }
+        Ok(first.map(|(drive, asked, least, most)| self.reason(bounds.actuator, drive, asked, (least, most))))
+    }
+
+    fn reason(&self, actuator: ActuatorKind, drive: f64, asked: f64, (least, most): (f64, f64)) -> String {
+        let given = format!(
+            "rig.drive gives {} N m, rig.actuator and friction {} to {} N m, and [reference] takes {} N m",
+            number(drive),
+            number(least),
+            number(most),
+            number(asked)
+        );
+        let change = match (asked > drive + most, actuator) {
+            (true, ActuatorKind::Brake) => {
+                "let rig.drive turn the shaft the path's way, or give rig and model a motor"
+            }
+            (true, _) => {
+                "let rig.drive hold the shaft back less, or raise the motor's gain or output's limits"
+            }
+            (false, ActuatorKind::Brake) => {
+                "let rig.drive turn the shaft with less, or raise the brake's gain or output.highest_v"
+            }
+            (false, _) => {
+                "let rig.drive push the shaft less, or raise the actuator's gain or output's limits"
+            }
+        };
+        format!("no voltage keeps this rig's shaft on the path: {given}; {change}")
+    }
+}
