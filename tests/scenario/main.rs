@@ -544,7 +544,7 @@ fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
             "{name} with {set:?}: {found}"
         );
     }
-    for built_in in clutch_sim::scenario::BUILT_IN {
+    for built_in in BUILT_IN {
         assert_eq!(reason(built_in.name, &[]), None, "{}", built_in.name);
     }
     // A weight that is on the edge of what the brake holds: 10 V, μ_s as well as μ_d.

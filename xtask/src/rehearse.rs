@@ -72,12 +72,19 @@ fn touched(patch: &str) -> Vec<(String, usize, bool)> {
         match line {
             _ if line.starts_with("new file mode") => file.2 = true,
             _ if line.starts_with("+++") || line.starts_with("---") => {}
-            _ if line.starts_with('+') => file.1 += 1,
+            // As `touch` counts: neither comments nor empty lines.
+            _ if line.strip_prefix('+').is_some_and(|code| !["", "//"].contains(&begin(code))) => file.1 += 1,
             _ => {}
         }
     }
     files.retain(|(path, ..)| is_product(path));
     files
+}
+
+/// The two characters that a line begins with.
+fn begin(line: &str) -> &str {
+    let line = line.trim_start();
+    line.get(..2).unwrap_or(line)
 }
 
 /// The file that the fact is in, and the lines that it takes elsewhere.
