@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "Shafts", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identified_rows", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "RELEASE_DEG", "SPIN_US", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "Shafts", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identified_rows", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
 
 BUILD: Final[str]
 """
@@ -28,6 +28,16 @@ Version and commit of the build, as logs record it.
 DEFAULT_PRIORITY: Final[int]
 """
 Priority of the loop's control thread unless another is given.
+"""
+
+RELEASE_DEG: Final[float]
+"""
+Longest way of a shaft in the release test unless another is given, °.
+"""
+
+SPIN_US: Final[int]
+"""
+Time before a sample at which spinning begins unless another is given, µs.
 """
 
 VERSION: Final[str]
@@ -801,7 +811,7 @@ def friction_lab(scenario: Scenario) -> dict[str, Any]:
 
 def identified_rows() -> list[tuple[str, str, str, float]]:
     """
-    Key, name for readers, unit and the factor from SI to it, of each parameter that identification may tell, in the order in
+    Key, name for readers, unit and the factor from SI to it, of each parameter that identification may determine, in the order in
     which they are shown.
     """
 

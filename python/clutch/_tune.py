@@ -463,7 +463,8 @@ def tune(
     scenario : Scenario, str or path
         A scenario of the rig whose path is a ramp.
     identified : Identified, optional
-        The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with delay and ripple of its rig.
+        The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with its rig's delay and
+        ripple.
     rates_deg_s : iterable of float, optional
         Rates at which it is to be smooth, °/s; default: the scenario's own.
     candidates : int, default 32

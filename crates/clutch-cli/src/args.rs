@@ -2,8 +2,6 @@
 
 use anyhow::{Context, bail};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clutch_core::params::Word;
 use clutch_identify::RigFile;
 use clutch_sim::Scenario;
 use std::path::{Path, PathBuf};
@@ -29,15 +27,6 @@ pub(crate) struct ScenarioArgs {
 pub(crate) fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE, as law.smc.kp_v=4")?;
     Ok((key.trim().to_owned(), value.trim().to_owned()))
-}
-
-/// A parser of one of some words, whose meanings are in the help.
-pub(crate) fn word<T: Clone + Send + Sync + 'static>(
-    words: &'static [Word],
-    named: fn(&str) -> Option<T>,
-) -> impl TypedValueParser<Value = T> {
-    let shown = words.iter().map(|word| PossibleValue::new(word.name).help(word.doc.trim()));
-    PossibleValuesParser::new(shown).try_map(move |text| named(&text).ok_or("none of the words"))
 }
 
 impl ScenarioArgs {

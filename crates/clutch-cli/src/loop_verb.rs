@@ -1,6 +1,6 @@
 //! `clutch loop`.
 
-use crate::args::{ScenarioArgs, key_value, word};
+use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
 use crate::output::{
     BUILD, Exit, beside, coloured, folded, json, not_certified, paragraph, quiet, report, shown, warn,
@@ -8,7 +8,9 @@ use crate::output::{
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use clutch_core::params::Word;
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
@@ -26,6 +28,15 @@ use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A parser of one of some words, whose meanings are in the help.
+fn word<T: Clone + Send + Sync + 'static>(
+    words: &'static [Word],
+    named: fn(&str) -> Option<T>,
+) -> impl TypedValueParser<Value = T> {
+    let shown = words.iter().map(|word| PossibleValue::new(word.name).help(word.doc.trim()));
+    PossibleValuesParser::new(shown).try_map(move |text| named(&text).ok_or("none of the words"))
+}
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum OverrunsArg {
