@@ -1,8 +1,10 @@
 """The package is the Rust code: the same bits as the command, whatever way they are asked for."""
 
 import copy
+import inspect
 import json
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -54,6 +56,33 @@ def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
     for column, values in seen.items():
         assert run.samples[column].tolist() == values, f"{name}: {column} differs"
     assert plant.events() == run.events
+
+
+# Parameters of functions with the same option of the command.
+DEFAULTS = [
+    (package.loop, "release_test", "loop", "--release-test"),
+    (package.loop, "release_deg", "loop", "--release-deg"),
+    (package.loop, "on_drift", "loop", "--on-drift"),
+    (package.loop, "pace", "loop", "--pace"),
+    (package.loop, "wait", "loop", "--wait"),
+    (package.loop, "spin_us", "loop", "--spin-us"),
+    (package.loop, "thread_priority", "loop", "--thread-priority"),
+    (package.loop, "fault_seed", "loop", "--fault-seed"),
+    (package.tune, "candidates", "tune", "--candidates"),
+    (package.lowest_smooth_speed, "discs", "map", "--discs"),
+]
+
+
+@pytest.mark.parametrize(("function", "parameter", "verb", "option"), DEFAULTS, ids=lambda x: str(x).strip("-"))
+def test_a_default_and_the_words_of_a_choice_are_those_of_the_command(clutch, function, parameter, verb, option):
+    text = clutch(verb, "--help").stdout
+    text = re.split(rf"^ +{option} <", text, flags=re.MULTILINE)[1]
+    text = re.split(r"^ +(?:-\w, )?--\w", text, flags=re.MULTILINE)[0]
+    default = inspect.signature(function).parameters[parameter].default
+    assert re.search(r"\[default: (\S+)\]", text)[1] == str(default)
+    words = re.findall(r"^ +- (\w+):", text, re.MULTILINE)
+    if words:
+        assert re.findall(r"['\"](\w+)['\"]", function.__annotations__[parameter]) == words
 
 
 def test_the_meter_tells_none_where_counts_and_voltage_cannot_tell():
