@@ -50,7 +50,7 @@ __all__ = [
     "Release",
     "Rig",
     "Ripple",
-    "RunSettings",
+    "RunOptions",
     "Runout",
     "Safety",
     "Sampling",
@@ -2401,7 +2401,7 @@ class Bounds(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class RunSettings(_Params):
+class RunOptions(_Params):
     """Length, beginning, seed and engine of a run.
 
     Parameters
@@ -2442,7 +2442,7 @@ class RunSettings(_Params):
     Examples
     --------
     >>> import clutch
-    >>> clutch.RunSettings(duration_s=10, seed=7).seed
+    >>> clutch.RunOptions(duration_s=10, seed=7).seed
     7
     """
 
@@ -2756,8 +2756,8 @@ class _Scenario(_Params):
         Sampling period, scalar. By default `Sampling()`.
     bounds : Bounds
         Accuracy to which the believed plant is known. By default `Bounds()`.
-    run : RunSettings
-        Length, beginning, seed and engine. By default `RunSettings()`.
+    run : RunOptions
+        Length, beginning, seed and engine. By default `RunOptions()`.
     friction_map : FrictionMap or None, default None
         Friction along the disc, from an earlier ride.
     safety : Safety or None, default None
@@ -2790,6 +2790,6 @@ class _Scenario(_Params):
     reference: Reference
     sampling: Sampling = field(default_factory=Sampling)
     bounds: Bounds = field(default_factory=Bounds)
-    run: RunSettings = field(default_factory=RunSettings)
+    run: RunOptions = field(default_factory=RunOptions)
     friction_map: FrictionMap | None = None
     safety: Safety | None = None
