@@ -633,6 +633,18 @@ def test_a_simulations_log_shows_what_was_measured_and_commanded(log, smc, tmp_p
     assert [text.get_text() for text in state.get_yticklabels()] == ["Running"]
 
 
+COUNTERS = (
+    "lost",
+    "late",
+    "duplicated",
+    "reordered",
+    "rejected_frames",
+    "rejected_samples",
+    "deadline_misses",
+    "log_dropped",
+)
+
+
 def loop_log(log, lost=0):
     """The same log as if a loop had written it: answers that take time, a link, and a fault at the end."""
     channels = {name: dict(table.to_dict()) for name, table in log.channels.items() if name != "truth"}
@@ -651,7 +663,7 @@ def loop_log(log, lost=0):
         "cause": ["None", "StandStill"],
         "value": [0.0, 4e-4],
     }
-    link = {name: [0, lost] for name in plot._COUNTERS}
+    link = {name: [0, lost] for name in COUNTERS}
     channels["link"] = {"time_s": [0.5, 0.999], "tick": [500, 999], "received": [500, 999], **link}
     safe = Scenario.load("board_smc_2")
     tables = {k: Table(v) for k, v in channels.items()}
@@ -677,7 +689,7 @@ def test_a_loops_log_shows_answers_link_and_the_fault_that_ended_it(log, tmp_pat
 def test_what_went_wrong_on_the_link_is_drawn_by_name(log, tmp_path):
     figure = plot.log_overview(loop_log(log, lost=3))
     drawn(figure, tmp_path, "link")
-    assert set(names(figure.axes[-1])) == {name.replace("_", " ") for name in plot._COUNTERS}
+    assert set(names(figure.axes[-1])) == {name.replace("_", " ") for name in COUNTERS}
     assert line(figure.axes[-1], "lost").get_ydata().tolist() == [0, 3]
 
 

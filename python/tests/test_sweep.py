@@ -557,7 +557,7 @@ def test_the_command_writes_the_same_table_as_parquet(clutch_with_parquet, tmp_p
 
 def test_a_key_that_does_not_end_with_its_unit_has_it_in_parquet(clutch_with_parquet, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    axes = {"rig.encoder.counts_per_rev": "2000", "rig.dac.bits": "12", "safety.limits.lost": "8"}
+    axes = {"rig.encoder.counts_per_rev": "40000", "rig.dac.bits": "12", "safety.limits.lost": "8"}
     file = tmp_path / "table.parquet"
     over = [word for key, value in axes.items() for word in ("--over", f"{key}={value}")]
     clutch_with_parquet("sweep", "board_smc_2", "--set", "run.duration_s=1.2", *over, "--out", file)
