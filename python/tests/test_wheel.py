@@ -73,7 +73,9 @@ DEFAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("function", "parameter", "verb", "option"), DEFAULTS, ids=lambda x: str(x).strip("-"))
+@pytest.mark.parametrize(
+    ("function", "parameter", "verb", "option"), DEFAULTS, ids=[f"{row[2]} {row[3]}" for row in DEFAULTS]
+)
 def test_a_default_and_the_words_of_a_choice_are_those_of_the_command(clutch, function, parameter, verb, option):
     text = clutch(verb, "--help").stdout
     text = re.split(rf"^ +{option} <", text, flags=re.MULTILINE)[1]
