@@ -590,7 +590,7 @@ fn the_runs_of_the_motor_that_the_docs_show_are_the_runs_that_come() {
         }
         checked += 1;
     }
-    assert_eq!(checked, 7);
+    assert_eq!(checked, 8);
 }
 
 /// The same page: its file in full, and the figures within its sentences.
