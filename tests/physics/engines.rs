@@ -124,7 +124,7 @@ fn the_exact_flow_says_which_rigs_it_cannot_take() {
         (RigParams { actuator_time_constant: Some(1e-3), ..paper() }, "lag"),
     ] {
         let error = simulate::<f64>(&spec(rig.clone())).unwrap_err();
-        assert!(matches!(error, RunError::Engine(_)) && error.to_string().contains(word), "{error}");
+        assert!(matches!(error, RunError::Engine { .. }) && error.to_string().contains(word), "{error}");
         let mut auto = spec(rig);
         auto.run.engine = EngineKind::Auto;
         assert_eq!(simulate::<f64>(&auto).unwrap().engine, EngineKind::DormandPrince);

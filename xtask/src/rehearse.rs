@@ -48,8 +48,18 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// Applies a patch; the files that it touches, with the lines that it adds and takes, and if it makes the file.
-fn apply(tree: &Path, name: &str) -> Result<Vec<(String, usize, bool)>> {
+/// A file of the product that a patch touches.
+#[derive(Debug)]
+struct Touched {
+    path: String,
+    /// Lines that it adds there; as `touch` counts, neither comments nor empty ones.
+    lines: usize,
+    /// True if it makes the file.
+    new: bool,
+}
+
+/// Applies a patch; the files that it touches.
+fn apply(tree: &Path, name: &str) -> Result<Vec<Touched>> {
     let patch = root().join("xtask/rehearsal").join(format!("{name}.patch"));
     let text = std::fs::read_to_string(&patch).with_context(|| patch.display().to_string())?;
     // Not one of this repository: git would look for the paths in its root.
@@ -60,43 +70,32 @@ fn apply(tree: &Path, name: &str) -> Result<Vec<(String, usize, bool)>> {
     Ok(touched(&text))
 }
 
-/// Files of a patch.
-fn touched(patch: &str) -> Vec<(String, usize, bool)> {
-    let mut files: Vec<(String, usize, bool)> = Vec::new();
+fn touched(patch: &str) -> Vec<Touched> {
+    let mut files: Vec<Touched> = Vec::new();
     for line in patch.lines() {
-        if let Some(paths) = line.strip_prefix("diff --git a/") {
-            let path = paths.split(" b/").next().unwrap_or_default();
-            files.push((path.to_owned(), 0, false));
+        if let Some((path, _)) = line.strip_prefix("diff --git a/").and_then(|paths| paths.split_once(" b/"))
+        {
+            files.push(Touched { path: path.to_owned(), lines: 0, new: false });
         }
         let Some(file) = files.last_mut() else { continue };
-        match line {
-            _ if line.starts_with("new file mode") => file.2 = true,
-            _ if line.starts_with("+++") || line.starts_with("---") => {}
-            // As `touch` counts: neither comments nor empty lines.
-            _ if line.strip_prefix('+').is_some_and(|code| !["", "//"].contains(&begin(code))) => file.1 += 1,
-            _ => {}
+        file.new |= line.starts_with("new file mode");
+        if let Some(added) = line.strip_prefix('+').map(str::trim).filter(|_| !line.starts_with("+++ ")) {
+            file.lines += usize::from(!added.is_empty() && !added.starts_with("//"));
         }
     }
-    files.retain(|(path, ..)| is_product(path));
+    files.retain(|file| is_product(&file.path));
     files
 }
 
-/// The two characters that a line begins with.
-fn begin(line: &str) -> &str {
-    let line = line.trim_start();
-    line.get(..2).unwrap_or(line)
-}
-
 /// The file that the fact is in, and the lines that it takes elsewhere.
-fn split(files: &[(String, usize, bool)]) -> (String, String) {
-    let own =
-        files.iter().find(|(_, _, new)| *new).or_else(|| files.iter().max_by_key(|(_, lines, _)| *lines));
-    let Some((path, lines, new)) = own else { return ("none".to_owned(), "none".to_owned()) };
-    let others: Vec<String> =
-        files.iter().filter(|(p, ..)| p != path).map(|(p, lines, _)| format!("{lines} in {p}")).collect();
-    let new = if *new { ", new" } else { "" };
+fn split(files: &[Touched]) -> (String, String) {
+    let own = files.iter().find(|file| file.new).or_else(|| files.iter().max_by_key(|file| file.lines));
+    let Some(own) = own else { return ("none".to_owned(), "none".to_owned()) };
+    let others = files.iter().filter(|file| file.path != own.path);
+    let others: Vec<String> = others.map(|file| format!("{} in {}", file.lines, file.path)).collect();
+    let new = if own.new { ", new" } else { "" };
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
-    (format!("{path}{new}, {lines} lines"), others)
+    (format!("{}{new}, {} lines", own.path, own.lines), others)
 }
 
 /// The additions in use: by the command, in a log and its replay, from Python.

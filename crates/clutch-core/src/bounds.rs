@@ -119,7 +119,7 @@ impl<T: Real> Bounds<T> {
     /// of the output, whichever corner is the true one, N m. With a brake 0 … 0, with a motor `−k_t u_max … k_t u_max`.
     #[must_use]
     pub fn drives(&self, lowest: T, highest: T) -> Interval<T> {
-        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(|u| self.driving(u));
+        let [a, b, c] = corners(lowest, highest).map(|u| self.driving(u));
         Interval { low: a.high.min(b.high).min(c.high), high: a.low.max(b.low).max(c.low) }
     }
 
@@ -150,9 +150,15 @@ impl<T: Real> Bounds<T> {
     /// motor without friction `−k_t u_max … k_t u_max`.
     #[must_use]
     pub fn authority(&self, forwards: bool, lowest: T, highest: T) -> Interval<T> {
-        // Torque is straight in the voltage on either side of 0.
-        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(|u| self.torque(forwards, u));
+        let [a, b, c] = corners(lowest, highest).map(|u| self.torque(forwards, u));
         Interval { low: a.high.min(b.high).min(c.high), high: a.low.max(b.low).max(c.low) }
+    }
+
+    /// All torques that actuator and friction give some shaft of the bounds at some voltage of the output, N m.
+    #[must_use]
+    pub fn possible(&self, forwards: bool, lowest: T, highest: T) -> Interval<T> {
+        let [a, b, c] = corners(lowest, highest).map(|u| self.torque(forwards, u));
+        Interval { low: a.low.min(b.low).min(c.low), high: a.high.max(b.high).max(c.high) }
     }
 
     /// The same for a shaft at rest, which friction helps to hold, N m.
@@ -162,7 +168,7 @@ impl<T: Real> Bounds<T> {
             let (drive, friction) = (self.driving(u), self.rubbing(&self.friction_at_rest, u));
             Interval { low: drive.high - friction.low, high: drive.low + friction.low }
         };
-        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(held);
+        let [a, b, c] = corners(lowest, highest).map(held);
         Interval { low: a.low.min(b.low).min(c.low), high: a.high.max(b.high).max(c.high) }
     }
 
@@ -174,6 +180,11 @@ impl<T: Real> Bounds<T> {
         let torque = Interval { low: drive.low + motor.low, high: drive.high + motor.high };
         torque.magnitude() - self.rubbing(&self.friction, volts).low
     }
+}
+
+/// Voltages between which torque is straight: the output's ends and 0, or the end that is nearest to it.
+fn corners<T: Real>(lowest: T, highest: T) -> [T; 3] {
+    [lowest, T::ZERO.max(lowest).min(highest), highest]
 }
 
 #[cfg(test)]
@@ -210,6 +221,8 @@ mod tests {
         near(b.torque(false, 3.0), 3.0 * b.weakest_brake(), 3.0 * b.strongest_brake());
         near(b.torque(true, -3.0), 0.0, 0.0);
         near(b.authority(true, 0.0, 10.0), -10.0 * b.weakest_brake(), 0.0);
+        near(b.possible(true, 0.0, 10.0), -10.0 * b.strongest_brake(), 0.0);
+        near(b.possible(false, 1.0, 10.0), b.weakest_brake(), 10.0 * b.strongest_brake());
         near(b.drives(0.0, 10.0), 0.0, 0.0);
         // At rest with 10 V the friction holds either way: 0.18 … 0.22 of it.
         let held = 10.0 * 0.18 * 0.112;

@@ -135,14 +135,27 @@ impl<'a> RunSpec<'a> {
     pub fn engine(&self, rig: &Rig) -> Result<EngineKind, RunError> {
         let lags = self.rig.actuator_time_constant.is_some();
         let bends = rig.model.plant.friction().bristles().is_some();
-        match (self.run.engine, bends) {
+        let asked = self.run.engine;
+        let refused = |expected: String| Err(RunError::Engine { asked, expected });
+        match (asked, bends) {
             (EngineKind::Auto | EngineKind::Bristle, true) => return Ok(EngineKind::Bristle),
-            (EngineKind::Bristle, false) => return Err(RunError::NoBristles),
-            (engine, true) => return Err(RunError::Bristles(engine)),
+            (EngineKind::Bristle, false) => {
+                return refused(
+                    "dormand_prince, exact_flow or auto: the rig's friction has no bristles".to_owned(),
+                );
+            }
+            (_, true) => {
+                return refused(
+                    "bristle or auto: the rig's friction has bristles, which bend before it slides"
+                        .to_owned(),
+                );
+            }
             _ => {}
         }
-        match (self.run.engine, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
-            (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
+        match (asked, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
+            (EngineKind::ExactFlow, Some(needs)) => {
+                refused(format!("dormand_prince or auto: exact_flow needs {needs}"))
+            }
             (EngineKind::DormandPrince | EngineKind::Bristle, _) | (EngineKind::Auto, Some(_)) => {
                 Ok(EngineKind::DormandPrince)
             }
@@ -215,16 +228,13 @@ pub enum RunError {
     #[error("the servo has another period or another encoder than the run")]
     OtherServo,
     /// The engine cannot take the rig.
-    #[error("engine = exact_flow: expected dormand_prince or auto: exact_flow needs {0}")]
-    Engine(&'static str),
-    /// The friction has bristles, which the engine has not.
-    #[error("engine = {}: expected bristle or auto: the rig's friction has bristles, which bend before it slides", .0.name())]
-    Bristles(EngineKind),
-    /// The friction has no bristles, which the engine needs.
-    #[error(
-        "engine = bristle: expected dormand_prince, exact_flow or auto: the rig's friction has no bristles"
-    )]
-    NoBristles,
+    #[error("engine = {}: expected {expected}", .asked.name())]
+    Engine {
+        /// The engine that was asked for.
+        asked: EngineKind,
+        /// Those that can, and why that one cannot.
+        expected: String,
+    },
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),

@@ -32,13 +32,8 @@ impl Scenario {
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let Interval { low, high } = bounds.friction;
         bounds.friction = Interval { low: low * (1.0 - swing), high: high * (1.0 + swing) };
-        let (lowest, highest) = (p.output.lowest, p.output.highest);
-        // Torque of actuator and friction at some voltage and some place of the disc, forwards and backwards.
-        let given = [true, false].map(|forwards| {
-            let at = [lowest, 0.0_f64.clamp(lowest, highest), highest].map(|u| bounds.torque(forwards, u));
-            let least = at.iter().fold(f64::INFINITY, |least, torque| least.min(torque.low));
-            (least, at.iter().fold(f64::NEG_INFINITY, |most, torque| most.max(torque.high)))
-        });
+        let given =
+            [true, false].map(|forwards| bounds.possible(forwards, p.output.lowest, p.output.highest));
         let path = self.path().map_err(|e| self.at("reference", &e))?;
         let period = p.sampling.sampling.period.seconds::<f64>();
         let ticks = self.ticks();
@@ -54,37 +49,33 @@ impl Scenario {
                 (tick as f64 * period, target.position.minus::<f64>(FixedCounts(0)) * radians);
             let drive = rig.drive.torque(time, angle);
             let asked = plant.inertia * target.acceleration + plant.viscous_damping * target.velocity;
-            let (least, most) = given[usize::from(target.velocity < 0.0)];
-            if asked >= drive - noise + least && asked <= drive + noise + most {
+            let given = given[usize::from(target.velocity < 0.0)];
+            if asked >= drive - noise + given.low && asked <= drive + noise + given.high {
                 return Ok(None);
             }
-            first.get_or_insert((drive, asked, least, most));
+            first.get_or_insert((drive, asked, given));
         }
-        Ok(first.map(|(drive, asked, least, most)| self.reason(bounds.actuator, drive, asked, (least, most))))
+        Ok(first.map(|(drive, asked, given)| reason(bounds.actuator, drive, asked, &given)))
     }
+}
 
-    fn reason(&self, actuator: ActuatorKind, drive: f64, asked: f64, (least, most): (f64, f64)) -> String {
-        let given = format!(
-            "rig.drive gives {} N m, rig.actuator and friction {} to {} N m, and [reference] takes {} N m",
-            number(drive),
-            number(least),
-            number(most),
-            number(asked)
-        );
-        let change = match (asked > drive + most, actuator) {
-            (true, ActuatorKind::Brake) => {
-                "let rig.drive turn the shaft the path's way, or give rig and model a motor"
-            }
-            (true, _) => {
-                "let rig.drive hold the shaft back less, or raise the motor's gain or output's limits"
-            }
-            (false, ActuatorKind::Brake) => {
-                "let rig.drive turn the shaft with less, or raise the brake's gain or output.highest_v"
-            }
-            (false, _) => {
-                "let rig.drive push the shaft less, or raise the actuator's gain or output's limits"
-            }
-        };
-        format!("no voltage keeps this rig's shaft on the path: {given}; {change}")
-    }
+fn reason(actuator: ActuatorKind, drive: f64, asked: f64, given: &Interval) -> String {
+    let torques = format!(
+        "rig.drive gives {} N m, rig.actuator and friction {} to {} N m, and [reference] takes {} N m",
+        number(drive),
+        number(given.low),
+        number(given.high),
+        number(asked)
+    );
+    let change = match (asked > drive + given.high, actuator) {
+        (true, ActuatorKind::Brake) => {
+            "let rig.drive turn the shaft the path's way, or give rig and model a motor"
+        }
+        (true, _) => "let rig.drive hold the shaft back less, or raise the motor's gain or output's limits",
+        (false, ActuatorKind::Brake) => {
+            "let rig.drive turn the shaft with less, or raise the brake's gain or output.highest_v"
+        }
+        (false, _) => "let rig.drive push the shaft less, or raise the actuator's gain or output's limits",
+    };
+    format!("no voltage keeps this rig's shaft on the path: {torques}; {change}")
 }

@@ -725,11 +725,8 @@ impl Scenario {
     pub fn run_error(&self, e: &RunError) -> ScenarioError {
         match e {
             RunError::Param(e) => self.at("", e),
-            RunError::Engine(_) | RunError::Bristles(_) | RunError::NoBristles => {
-                let (text, value) = (e.to_string(), self.params.run.engine.name());
-                let told = format!("engine = {value}: ");
-                let message = text.strip_prefix(&told).unwrap_or(&text).to_owned();
-                ScenarioError::new(&self.origin, "run.engine", &format!("{value:?}"), message)
+            RunError::Engine { asked, expected } => {
+                ScenarioError::value(&self.origin, "run.engine", &format!("{:?}", asked.name()), expected)
             }
             RunError::Motion(_) => self.message("rig", e.to_string()),
             RunError::Begin(_) => self.path_message(e.to_string()),
