@@ -68,4 +68,26 @@ static inline float smc_sign(const peer_smc_law *l, float *offset, const peer_ti
     return output(&l->output, offset, -(l->kp * sgn(surface)) - l->kd * sgn(across) * t->error_rate);
 }
 
+/* The integral follows a limit, and keeps within what the output can answer. What is no number leaves it as it is. */
+static inline float pid(const peer_pid_law *l, peer_pid_memory *m, const peer_tick *t)
+{
+    float forward = l->bias - l->coulomb * sgn(t->target_velocity) - l->velocity * t->target_velocity
+        - l->acceleration * t->target_acceleration;
+    float rate = m->rate + l->newest * (t->error_rate - m->rate);
+    float integral = m->integral - l->ki_step * t->error;
+    float demand = integral - l->kp * t->error - l->kd * rate + forward;
+    float volts = output(&l->output, &m->offset, demand);
+    if (volts <= l->output.lowest || volts >= l->output.highest)
+        integral += l->tracking * (volts - demand);
+    float low = l->output.lowest - forward, high = l->output.highest - forward;
+    if (integral >= low && integral <= high)
+        m->integral = integral;
+    else if (integral < low && integral >= -1e30f)
+        m->integral = low;
+    else if (integral > high && integral <= 1e30f)
+        m->integral = high;
+    m->rate = rate >= -1e3f && rate <= 1e3f ? rate : 0.0f;
+    return volts;
+}
+
 #endif

@@ -37,3 +37,9 @@ uint16_t peer_servo_smc(peer_smc_axis *a, int32_t counts)
     peer_tick tick = measured(&a->channel, &a->memory, &a->target, counts);
     return coded(&a->channel, smc(&a->law, &a->memory.offset, &tick));
 }
+
+uint16_t peer_servo_pid(peer_pid_axis *a, int32_t counts)
+{
+    peer_tick tick = measured(&a->channel, &a->memory, &a->target, counts);
+    return coded(&a->channel, pid(&a->law, &a->of_law, &tick));
+}

@@ -16,9 +16,11 @@ typedef struct { int32_t error; float rate, offset; } peer_memory;
 typedef struct { peer_channel channel; peer_memory memory; peer_target target; peer_pd_law law; } peer_pd_axis;
 typedef struct { peer_channel channel; peer_memory memory; peer_target target; peer_ctc_law law; } peer_ctc_axis;
 typedef struct { peer_channel channel; peer_memory memory; peer_target target; peer_smc_law law; } peer_smc_axis;
+typedef struct { peer_channel channel; peer_memory memory; peer_target target; peer_pid_law law; peer_pid_memory of_law; } peer_pid_axis;
 
 uint16_t peer_servo_pd(peer_pd_axis *a, int32_t counts);
 uint16_t peer_servo_ctc(peer_ctc_axis *a, int32_t counts);
 uint16_t peer_servo_smc(peer_smc_axis *a, int32_t counts);
+uint16_t peer_servo_pid(peer_pid_axis *a, int32_t counts);
 
 #endif

@@ -1,7 +1,7 @@
 //! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
-use clutch_core::law::{ControlLaw, Ctc, Law, Pd, Smc};
+use clutch_core::law::{ControlLaw, Ctc, Law, Pd, Pid, Smc};
 use clutch_core::{Counts, DacCode, Servo, ServoState, Target};
 use clutch_node::{BoardController, Hardware, OneChip, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
@@ -90,6 +90,7 @@ servos! {
     servo_pd Pd;
     servo_ctc Ctc;
     servo_smc Smc;
+    servo_pid Pid;
 }
 
 /// The bytes of one frame in, its message out.

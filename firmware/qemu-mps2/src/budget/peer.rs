@@ -4,7 +4,7 @@ use crate::inputs::{Random, ticks};
 use crate::laws::{OF_EACH, PERIOD, output};
 use crate::meter::{Tally, instructions, line};
 use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSign, SmcSignParams,
+    ControlLaw, Ctc, CtcParams, Listed, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign, SmcSignParams,
 };
 use clutch_core::{Actuator, PlantParams, StribeckParams};
 
@@ -17,7 +17,7 @@ struct PeerTick([f32; 4]);
 #[derive(Clone, Copy)]
 pub struct PeerOutput(pub [f32; 4]);
 
-/// `peer_pd_law`, `peer_ctc_law`, `peer_smc_law`: gains, then the output.
+/// `peer_pd_law`, `peer_ctc_law`, `peer_smc_law`, `peer_pid_law`: gains, then the output.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PeerLaw<const N: usize> {
@@ -25,20 +25,25 @@ pub struct PeerLaw<const N: usize> {
     pub output: PeerOutput,
 }
 
-type Step<const N: usize> = unsafe extern "C" fn(*const PeerLaw<N>, *mut f32, *const PeerTick) -> f32;
+/// What a law remembers: the offset of a bumpless start, then of PID `peer_pid_memory`.
+pub type Memory<const M: usize> = [f32; M];
+
+type Step<const N: usize, const M: usize> =
+    unsafe extern "C" fn(*const PeerLaw<N>, *mut Memory<M>, *const PeerTick) -> f32;
 
 unsafe extern "C" {
-    fn peer_pd(law: *const PeerLaw<2>, offset: *mut f32, tick: *const PeerTick) -> f32;
-    fn peer_ctc(law: *const PeerLaw<10>, offset: *mut f32, tick: *const PeerTick) -> f32;
-    fn peer_smc(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
-    fn peer_smc_sign(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
+    fn peer_pd(law: *const PeerLaw<2>, memory: *mut Memory<1>, tick: *const PeerTick) -> f32;
+    fn peer_ctc(law: *const PeerLaw<10>, memory: *mut Memory<1>, tick: *const PeerTick) -> f32;
+    fn peer_smc(law: *const PeerLaw<4>, memory: *mut Memory<1>, tick: *const PeerTick) -> f32;
+    fn peer_smc_sign(law: *const PeerLaw<4>, memory: *mut Memory<1>, tick: *const PeerTick) -> f32;
+    fn peer_pid(law: *const PeerLaw<9>, memory: *mut Memory<3>, tick: *const PeerTick) -> f32;
 }
 
 /// Counts the C version, and the number of ordinary inputs for which its answer is more than a
 /// millivolt from ours: it may fuse a product and a sum.
-fn law<const N: usize, L: ControlLaw<f32, State = OutputState<f32>>>(
+fn law<const N: usize, const M: usize, L: ControlLaw<f32>>(
     name: &'static str,
-    step: Step<N>,
+    step: Step<N, M>,
     gains: [f32; N],
     ours: &L,
 ) {
@@ -46,17 +51,20 @@ fn law<const N: usize, L: ControlLaw<f32, State = OutputState<f32>>>(
     let law = PeerLaw { gains, output: PeerOutput([o.lowest, o.highest, o.on_invalid, 0.98]) };
     let mut tally = Tally::new(name);
     let mut random = Random::new(1);
-    let (mut offset, mut differs) = (0.0, 0);
+    let (mut memory, mut differs) = ([0.0; M], 0);
     ticks(&mut Random::new(2), OF_EACH, |t, ordinary| {
         if random.below(8) == 0 {
-            offset = random.around(10.0);
+            memory = [0.0; M];
+            if let Some(offset) = memory.first_mut() {
+                *offset = random.around(10.0);
+            }
         }
         let tick = PeerTick([t.error, t.error_rate, t.target_velocity, t.target_acceleration]);
-        let arguments = [&raw const law as usize, &raw mut offset as usize, &raw const tick as usize];
+        let arguments = [&raw const law as usize, &raw mut memory as usize, &raw const tick as usize];
         // SAFETY: the arguments are those of the function.
         tally.add(unsafe { instructions(step as usize, arguments) });
-        let mut state = OutputState::default();
-        let mut none = 0.0;
+        let mut state = L::State::default();
+        let mut none = [0.0; M];
         // SAFETY: the arguments are those of the function.
         let theirs = unsafe { step(&law, &mut none, &tick) };
         let apart = ours.update(&mut state, &t).voltage - theirs;
@@ -98,6 +106,23 @@ pub fn smc_gains() -> [f32; 4] {
     [p.kp, p.kd, p.slope, 1.0 / p.boundary]
 }
 
+/// As [`pd_gains`], with all that the law has.
+pub fn pid_gains() -> [f32; 9] {
+    let p = <Pid<f32> as Listed<f32>>::busiest();
+    let period = PERIOD.seconds::<f32>();
+    [
+        p.kp,
+        p.ki * period,
+        p.kd,
+        period / (p.derivative_time + period),
+        period / p.tracking_time,
+        p.bias,
+        p.coulomb,
+        p.velocity,
+        p.acceleration,
+    ]
+}
+
 /// Measures and prints.
 pub fn measure() -> Option<()> {
     let (plant, output) = (PlantParams::<f32>::default(), output());
@@ -109,5 +134,7 @@ pub fn measure() -> Option<()> {
     law("peer_smc", peer_smc, smc_gains(), &Smc::new(&p, &output, PERIOD).ok()?);
     let p = SmcSignParams::<f32>::default();
     law("peer_smc_sign", peer_smc_sign, smc_gains(), &SmcSign::new(&p, &output, PERIOD).ok()?);
+    let p: PidParams<f32> = Pid::busiest();
+    law("peer_pid", peer_pid, pid_gains(), &Pid::new(&p, &output, PERIOD).ok()?);
     Some(())
 }

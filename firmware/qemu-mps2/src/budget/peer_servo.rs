@@ -2,9 +2,9 @@
 
 use crate::laws::output;
 use crate::meter::{Tally, instructions, line};
-use crate::peer::{PeerLaw, PeerOutput, ctc_gains, pd_gains, smc_gains};
-use crate::servos::{axis, ctc, inputs, params, pd, smc};
-use clutch_core::law::{ControlLaw, LawParams};
+use crate::peer::{Memory, PeerLaw, PeerOutput, ctc_gains, pd_gains, pid_gains, smc_gains};
+use crate::servos::{axis, ctc, inputs, params, pd, pid, smc};
+use clutch_core::law::{ControlLaw, LawParams, Listed, Pid};
 use clutch_core::{Counts, Dac, Servo, Target};
 
 /// `peer_channel`
@@ -33,22 +33,24 @@ struct PeerTarget {
     acceleration: f32,
 }
 
-/// `peer_pd_axis`, `peer_ctc_axis`, `peer_smc_axis`.
+/// `peer_pd_axis`, `peer_ctc_axis`, `peer_smc_axis`; `peer_pid_axis`, whose law has a memory.
 #[repr(C)]
 #[derive(Clone, Copy)]
-struct PeerAxis<const N: usize> {
+struct PeerAxis<const N: usize, const M: usize = 0> {
     channel: PeerChannel,
     memory: PeerMemory,
     target: PeerTarget,
     law: PeerLaw<N>,
+    of_law: Memory<M>,
 }
 
-type Step<const N: usize> = unsafe extern "C" fn(*mut PeerAxis<N>, i32) -> u16;
+type Step<const N: usize, const M: usize> = unsafe extern "C" fn(*mut PeerAxis<N, M>, i32) -> u16;
 
 unsafe extern "C" {
     fn peer_servo_pd(axis: *mut PeerAxis<2>, counts: i32) -> u16;
     fn peer_servo_ctc(axis: *mut PeerAxis<10>, counts: i32) -> u16;
     fn peer_servo_smc(axis: *mut PeerAxis<4>, counts: i32) -> u16;
+    fn peer_servo_pid(axis: *mut PeerAxis<9, 3>, counts: i32) -> u16;
 }
 
 /// Encoder, (5) and converter of our servo.
@@ -63,16 +65,22 @@ fn channel() -> Option<PeerChannel> {
 
 /// Counts the C version, and the number of near inputs for which its code is more than one from ours: it may fuse a
 /// product and a sum.
-fn servo<const N: usize, C: ControlLaw<f32>>(
+fn servo<const N: usize, const M: usize, C: ControlLaw<f32>>(
     name: &'static str,
-    step: Step<N>,
+    step: Step<N, M>,
     gains: [f32; N],
+    of_law: Memory<M>,
     ours: Servo<f32, C>,
 ) -> Option<()> {
     let o = output();
     let law = PeerLaw { gains, output: PeerOutput([o.lowest, o.highest, o.on_invalid, 0.0]) };
-    let begun =
-        PeerAxis { channel: channel()?, memory: PeerMemory::default(), target: PeerTarget::default(), law };
+    let begun = PeerAxis {
+        channel: channel()?,
+        memory: PeerMemory::default(),
+        target: PeerTarget::default(),
+        law,
+        of_law,
+    };
     // The lower word of a position: right while the shaft is near.
     let aims = |t: &Target<f32>| PeerTarget {
         position: t.position.0 as i32,
@@ -102,7 +110,10 @@ fn servo<const N: usize, C: ControlLaw<f32>>(
 
 /// Measures and prints.
 pub fn measure() -> Option<()> {
-    servo("peer_servo_pd", peer_servo_pd, pd_gains(), pd()?)?;
-    servo("peer_servo_ctc", peer_servo_ctc, ctc_gains()?, ctc()?)?;
-    servo("peer_servo_smc", peer_servo_smc, smc_gains(), smc()?)
+    servo("peer_servo_pd", peer_servo_pd, pd_gains(), [], pd()?)?;
+    servo("peer_servo_ctc", peer_servo_ctc, ctc_gains()?, [], ctc()?)?;
+    servo("peer_servo_smc", peer_servo_smc, smc_gains(), [], smc()?)?;
+    // At rest on its path, from 0 V: the integral makes up for the voltage without error.
+    let begun = [0.0, -<Pid<f32> as Listed<f32>>::busiest().bias, 0.0];
+    servo("peer_servo_pid", peer_servo_pid, pid_gains(), begun, pid()?)
 }

@@ -1,11 +1,12 @@
-//! The servo around PD, CTC and SMC: each chosen when the image is built, and among all laws as a host may choose it.
+//! The servo around PD, CTC, SMC and PID: each chosen when the image is built, and among all laws as a host may choose it.
 
 use crate::inputs::{CORNERS, Random};
-use crate::kernels::{Axis, servo_ctc, servo_pd, servo_smc, servo_tick};
+use crate::kernels::{Axis, servo_ctc, servo_pd, servo_pid, servo_smc, servo_tick};
 use crate::laws::{OF_EACH, PERIOD, output};
 use crate::meter::{Tally, instructions};
 use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, Law, LawParams, OutputParams, Pd, PdParams, Smc, SmcParams,
+    ControlLaw, Ctc, CtcParams, Law, LawParams, Listed, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
+    SmcParams,
 };
 use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
 
@@ -62,6 +63,12 @@ pub fn smc() -> Option<Servo<f32, Smc<f32>>> {
     Servo::with_law(&params(p.into()), Smc::new(&p, &plain(), PERIOD).ok()?).ok()
 }
 
+/// As [`pd`], with all that the law has.
+pub fn pid() -> Option<Servo<f32, Pid<f32>>> {
+    let p: PidParams<f32> = Pid::busiest();
+    Servo::with_law(&params(p.into()), Pid::new(&p, &plain(), PERIOD).ok()?).ok()
+}
+
 /// The axis at rest on its path.
 pub fn axis<C: ControlLaw<f32>>(servo: Servo<f32, C>) -> Axis<C> {
     let target = Target::default();
@@ -88,9 +95,11 @@ pub fn measure() -> Option<()> {
     count("servo_pd", pd()?, servo_pd);
     count("servo_ctc", ctc()?, servo_ctc);
     count("servo_smc", smc()?, servo_smc);
+    count("servo_pid", pid()?, servo_pid);
     let any = |law: LawParams<f32>| Servo::<f32, Law<f32>>::new(&params(law)).ok();
     count("servo_tick_pd", any(PdParams::default().into())?, servo_tick);
     count("servo_tick_ctc", any(CtcParams::default().into())?, servo_tick);
     count("servo_tick_smc", any(SmcParams::default().into())?, servo_tick);
+    count("servo_tick_pid", any(Pid::busiest().into())?, servo_tick);
     Some(())
 }
