@@ -82,19 +82,41 @@ fn figures_of_bristles_do_not_depend_on_the_period_in_which_the_motion_is_asked(
     assert!(compared[0] > 60 && compared[1] > 30, "{compared:?} figures");
 }
 
-/// Compares figures of a case at 1 ms, 0.1 ms and 10 µs, or these parts of its time between samples where that is longer;
-/// sampled as before, so that like is compared with like.
+#[test]
+#[ignore = "takes minutes: cargo test --test physics -- --ignored"]
+fn figures_of_hunting_and_of_lag_are_the_same_at_a_millisecond_a_tenth_and_a_hundredth() {
+    for engine in [RefereeEngine::Bristle, RefereeEngine::BristledSystem] {
+        let mut compared = 0;
+        for mut case in cases().into_iter().filter(|case| case.id == "L2" || case.id.starts_with("L6")) {
+            if takes(&Case { duration: case.sample, ..case.clone() }, engine).is_none() {
+                continue;
+            }
+            // A whole number of samples, of 1 ms or a little less.
+            case.sample = case.duration / f64::from((case.duration / 1e-3 - 1e-6) as u32 + 1);
+            compared += same_at(&case, engine, &[1.0, 0.1, 0.01]);
+        }
+        println!("{}: {compared} figures", engine.name());
+        assert!(compared >= 4, "{}: {compared} figures", engine.name());
+    }
+}
+
+/// Compares figures of a case at 1 ms, 0.1 ms and 10 µs, or these parts of its time between samples where that is longer.
 fn independent_of_the_period(mut case: Case, engine: RefereeEngine) -> usize {
     case.sample = case.sample.max(1e-3).min(case.duration / 20.0);
-    let figures = |share: f64| {
-        let trajectory = run(&case, engine, Some(case.sample * share)).unwrap();
-        case.judge(&trajectory)
-    };
     // The 200 s of L2 would take minutes; so would 10 µs for more than 2000 samples of a system.
     let shares: &[f64] = match case.samples() {
         100_000.. => &[1.0, 0.25],
         2_000.. if engine == RefereeEngine::BristledSystem => &[1.0, 0.1],
         _ => &[1.0, 0.1, 0.01],
+    };
+    same_at(&case, engine, shares)
+}
+
+/// Compares figures of a case at these shares of the time between its samples; sampled alike, so that like is compared with like.
+fn same_at(case: &Case, engine: RefereeEngine, shares: &[f64]) -> usize {
+    let figures = |share: f64| {
+        let trajectory = run(case, engine, Some(case.sample * share)).unwrap();
+        case.judge(&trajectory)
     };
     let finest = figures(shares[shares.len() - 1]);
     let mut compared = 0;

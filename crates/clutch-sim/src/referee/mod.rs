@@ -37,7 +37,10 @@ macro_rules! built_in {
 }
 built_in!(
     "A1",
+    "A1_dry",
     "A1_hold",
+    "A1_let_go",
+    "A1_slide",
     "A2",
     "A2_dry",
     "A3_pd",
