@@ -106,9 +106,8 @@ pub fn smc_gains() -> [f32; 4] {
     [p.kp, p.kd, p.slope, 1.0 / p.boundary]
 }
 
-/// As [`pd_gains`], with all that the law has.
-pub fn pid_gains() -> [f32; 9] {
-    let p = <Pid<f32> as Listed<f32>>::busiest();
+/// Of PID.
+pub fn pid_gains(p: &PidParams<f32>) -> [f32; 9] {
     let period = PERIOD.seconds::<f32>();
     [
         p.kp,
@@ -134,7 +133,8 @@ pub fn measure() -> Option<()> {
     law("peer_smc", peer_smc, smc_gains(), &Smc::new(&p, &output, PERIOD).ok()?);
     let p = SmcSignParams::<f32>::default();
     law("peer_smc_sign", peer_smc_sign, smc_gains(), &SmcSign::new(&p, &output, PERIOD).ok()?);
+    // With all that the law has, as ours is counted.
     let p: PidParams<f32> = Pid::busiest();
-    law("peer_pid", peer_pid, pid_gains(), &Pid::new(&p, &output, PERIOD).ok()?);
+    law("peer_pid", peer_pid, pid_gains(&p), &Pid::new(&p, &output, PERIOD).ok()?);
     Some(())
 }

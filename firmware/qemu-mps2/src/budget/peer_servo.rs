@@ -4,7 +4,7 @@ use crate::laws::output;
 use crate::meter::{Tally, instructions, line};
 use crate::peer::{Memory, PeerLaw, PeerOutput, ctc_gains, pd_gains, pid_gains, smc_gains};
 use crate::servos::{axis, ctc, inputs, params, pd, pid, smc};
-use clutch_core::law::{ControlLaw, LawParams, Listed, Pid};
+use clutch_core::law::{ControlLaw, LawParams, PidParams};
 use clutch_core::{Counts, Dac, Servo, Target};
 
 /// `peer_channel`
@@ -69,7 +69,6 @@ fn servo<const N: usize, const M: usize, C: ControlLaw<f32>>(
     name: &'static str,
     step: Step<N, M>,
     gains: [f32; N],
-    of_law: Memory<M>,
     ours: Servo<f32, C>,
 ) -> Option<()> {
     let o = output();
@@ -79,7 +78,7 @@ fn servo<const N: usize, const M: usize, C: ControlLaw<f32>>(
         memory: PeerMemory::default(),
         target: PeerTarget::default(),
         law,
-        of_law,
+        of_law: [0.0; M],
     };
     // The lower word of a position: right while the shaft is near.
     let aims = |t: &Target<f32>| PeerTarget {
@@ -110,10 +109,8 @@ fn servo<const N: usize, const M: usize, C: ControlLaw<f32>>(
 
 /// Measures and prints.
 pub fn measure() -> Option<()> {
-    servo("peer_servo_pd", peer_servo_pd, pd_gains(), [], pd()?)?;
-    servo("peer_servo_ctc", peer_servo_ctc, ctc_gains()?, [], ctc()?)?;
-    servo("peer_servo_smc", peer_servo_smc, smc_gains(), [], smc()?)?;
-    // At rest on its path, from 0 V: the integral makes up for the voltage without error.
-    let begun = [0.0, -<Pid<f32> as Listed<f32>>::busiest().bias, 0.0];
-    servo("peer_servo_pid", peer_servo_pid, pid_gains(), begun, pid()?)
+    servo("peer_servo_pd", peer_servo_pd, pd_gains(), pd()?)?;
+    servo("peer_servo_ctc", peer_servo_ctc, ctc_gains()?, ctc()?)?;
+    servo("peer_servo_smc", peer_servo_smc, smc_gains(), smc()?)?;
+    servo("peer_servo_pid", peer_servo_pid, pid_gains(&PidParams::default()), pid()?)
 }

@@ -5,8 +5,7 @@ use crate::kernels::{Axis, servo_ctc, servo_pd, servo_pid, servo_smc, servo_tick
 use crate::laws::{OF_EACH, PERIOD, output};
 use crate::meter::{Tally, instructions};
 use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, Law, LawParams, Listed, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
-    SmcParams,
+    ControlLaw, Ctc, CtcParams, Law, LawParams, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams,
 };
 use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
 
@@ -63,9 +62,9 @@ pub fn smc() -> Option<Servo<f32, Smc<f32>>> {
     Servo::with_law(&params(p.into()), Smc::new(&p, &plain(), PERIOD).ok()?).ok()
 }
 
-/// As [`pd`], with all that the law has.
+/// As [`pd`].
 pub fn pid() -> Option<Servo<f32, Pid<f32>>> {
-    let p: PidParams<f32> = Pid::busiest();
+    let p = PidParams::default();
     Servo::with_law(&params(p.into()), Pid::new(&p, &plain(), PERIOD).ok()?).ok()
 }
 
@@ -100,6 +99,6 @@ pub fn measure() -> Option<()> {
     count("servo_tick_pd", any(PdParams::default().into())?, servo_tick);
     count("servo_tick_ctc", any(CtcParams::default().into())?, servo_tick);
     count("servo_tick_smc", any(SmcParams::default().into())?, servo_tick);
-    count("servo_tick_pid", any(Pid::busiest().into())?, servo_tick);
+    count("servo_tick_pid", any(PidParams::default().into())?, servo_tick);
     Some(())
 }
