@@ -388,6 +388,11 @@ impl<'a, S: Station> Control<'a, S> {
             self.station.receive(now, bytes, &mut self.out, &mut notices);
             self.station.poll(now, &mut self.out, &mut notices);
         }
+        if self.is_last_tick() {
+            // With its answer, in one write: a board that has the answer and not the end would take one more sample.
+            batch.ended = self.end(StopReason::Done);
+            self.begun = true;
+        }
         // A cycle that the board did not report is missing like one that the log did not take.
         let untold = self.station.standing().untold;
         lost_records += 2 * untold.saturating_sub(self.untold);
@@ -560,16 +565,25 @@ impl<'a, S: Station> Control<'a, S> {
         }
     }
 
-    fn stop(&mut self, reason: StopReason) {
+    /// True if this machine closes the loop, and has heard the path's last tick.
+    fn is_last_tick(&self) -> bool {
+        let Standing { state, tick, .. } = self.station.standing();
+        !S::LOOKS_ON && state == State::Running && tick + 1 >= self.ticks
+    }
+
+    /// Ends control. None where the board says when it has ended.
+    fn end(&mut self, reason: StopReason) -> Option<Ending<S::Scalar>> {
         let from = self.station.standing().state;
         self.station.stop(reason, &mut self.out);
-        if S::LOOKS_ON {
-            return; // the board says when it has ended
-        }
         let Standing { state, cause, value, tick, .. } = self.station.standing();
-        if from != State::Ready {
+        (!S::LOOKS_ON).then_some(Ending { from, state, cause, value, tick })
+    }
+
+    /// Ends control between two wake-ups, and logs it.
+    fn stop(&mut self, reason: StopReason) {
+        if let Some(ending) = self.end(reason).filter(|e| e.from != State::Ready) {
             let now = monotonic_ns().saturating_sub(self.start_ns);
-            self.push(&[to_log::ended(now, &Ending { from, state, cause, value, tick })]);
+            self.push(&[to_log::ended(now, &ending)]);
         }
     }
 
@@ -657,12 +671,8 @@ impl<'a, S: Station> Control<'a, S> {
         match standing.state {
             State::Ready => {}
             State::Running | State::Armed => {
-                self.begun = true;
-                let last = standing.state == State::Running && standing.tick + 1 >= self.ticks;
                 if self.watch.stop.load(Ordering::Relaxed) {
                     self.stop(StopReason::Operator);
-                } else if !S::LOOKS_ON && last {
-                    self.stop(StopReason::Done);
                 } else if now >= due.second {
                     due.second += 1_000_000_000;
                     self.housekeeping(now);
