@@ -4,11 +4,15 @@ use clutch_web::declared::{figures, parameter};
 use serde_json::{Map, Value, json};
 
 /// Laws on common axes: name among the keys, name for people, scenario.
-const LAWS: [(&str, &str, &str); 3] =
-    [("pd", "PD", "bench_pd_2"), ("smc", "Sliding mode", "bench_smc_2"), ("glide", "Glide", "bench_glide_2")];
+const LAWS: [(&str, &str, &str); 4] = [
+    ("pd", "PD", "bench_pd_2"),
+    ("pid", "PID", "pid_2"),
+    ("smc", "SMC", "bench_smc_2"),
+    ("glide", "Glide", "bench_glide_2"),
+];
 
 /// Groups of sliders: title, law that alone has these keys, keys.
-const GROUPS: [(&str, Option<&str>, &[&str]); 5] = [
+const GROUPS: [(&str, Option<&str>, &[&str]); 6] = [
     (
         "Path and rig",
         None,
@@ -22,6 +26,7 @@ const GROUPS: [(&str, Option<&str>, &[&str]); 5] = [
         ],
     ),
     ("PD", Some("pd"), &["law.pd.kp_v_rad", "law.pd.kd_v_s_rad"]),
+    ("PID", Some("pid"), &["law.pid.kp_v_rad", "law.pid.ki_v_rad_s", "law.pid.kd_v_s_rad"]),
     (
         "Sliding mode",
         Some("smc"),
