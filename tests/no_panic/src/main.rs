@@ -211,7 +211,7 @@ fn friction<T: Real>() {
     sink(made(Stribeck::new(&any::<T, StribeckParams<T>>())));
     if let Some(f) = made(Friction::build(&any::<T, FrictionParams<T>>())) {
         sink([f.level(real()), f.coefficient(real()), f.at_rest(), f.sliding()]);
-        sink((f.quick(), f.envelope(), f.exponential(), made(f.check_divisor())));
+        sink((f.curve(), f.envelope(), f.exponential(), made(f.check_divisor())));
     }
 }
 

@@ -269,7 +269,7 @@ impl<T: Real> EdgeTimed<T> {
                 roughness: (decay + decay) * (wave * wave) * (p.ripple * p.ripple),
             },
             actuator,
-            curve: plant.friction().quick(),
+            curve: plant.friction().curve().filter(Stribeck::is_quick),
             drive_torque: model.drive_torque,
             per_torque,
             brake: (actuator.kind() == ActuatorKind::Brake).then_some(brake),

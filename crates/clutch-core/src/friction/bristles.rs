@@ -320,8 +320,8 @@ macro_rules! bristled {
                 self.curve.level(velocity)
             }
 
-            fn quick(&self) -> Option<$crate::Stribeck<T>> where T: $crate::Real {
-                self.curve.quick()
+            fn curve(&self) -> Option<$crate::Stribeck<T>> where T: $crate::Real {
+                Some(self.curve)
             }
 
             #[inline]

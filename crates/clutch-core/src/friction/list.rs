@@ -80,9 +80,11 @@ macro_rules! frictions {
                     $(Friction::$model(f) => f.level(velocity),)+
                 }
             }
-            fn quick(&self) -> Option<Stribeck<T>> where T: Real {
+            // A copy in each of its callers would cost a board's flash.
+            #[inline(never)]
+            fn curve(&self) -> Option<Stribeck<T>> where T: Real {
                 match self {
-                    $(Friction::$model(f) => f.quick(),)+
+                    $(Friction::$model(f) => f.curve(),)+
                 }
             }
             #[cfg_attr(target_os = "none", inline)]

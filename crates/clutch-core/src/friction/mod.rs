@@ -41,8 +41,8 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
     /// `|μ|` at a velocity (rad/s); towards rest, its limit.
     fn level(&self, velocity: T) -> T;
 
-    /// The level as Stribeck's curve with `δ` = 1, which is quick to compute; none if it is no such curve.
-    fn quick(&self) -> Option<Stribeck<T>>
+    /// Stribeck's curve that the level is; none if it is no such curve.
+    fn curve(&self) -> Option<Stribeck<T>>
     where
         T: Real,
     {

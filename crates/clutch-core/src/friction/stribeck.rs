@@ -100,12 +100,25 @@ impl<T: Arithmetic> Stribeck<T> {
         }
     }
 
-    /// The level if `δ` = 1, as for most pairs, and else another number. A power takes five times as long as the rest.
+    /// True if `δ` = 1, as for most pairs: a power takes five times as long as the rest.
+    #[inline]
+    pub(crate) fn is_quick(&self) -> bool {
+        self.exponent_is_one
+    }
+
+    /// The level if `δ` = 1, and else another number.
     // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
     #[cfg_attr(target_os = "none", inline)]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(crate) fn quick_level(&self, velocity: T) -> T {
         self.falling(velocity.abs() * self.inverse_velocity)
+    }
+
+    /// The level with any `δ`: to the power of 1 a number has the same bits.
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    pub(crate) fn level_by_power(&self, velocity: T) -> T {
+        self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
     }
 
     /// True where that has come down to its sliding level.
@@ -139,14 +152,14 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
         if self.exponent_is_one {
             return self.quick_level(velocity);
         }
-        self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
+        self.level_by_power(velocity)
     }
 
-    fn quick(&self) -> Option<Stribeck<T>>
+    fn curve(&self) -> Option<Stribeck<T>>
     where
         T: Real,
     {
-        self.exponent_is_one.then_some(*self)
+        Some(*self)
     }
 
     #[cfg_attr(target_os = "none", inline)]

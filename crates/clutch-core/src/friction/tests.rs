@@ -30,8 +30,8 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
             assert!(low <= level && level <= high, "{}: {level} at {v} rad/s", p.name());
             assert_eq!(f.coefficient(v), level * v.sgn(), "{}", p.name());
             // The curve that a model names is its curve.
-            if let Some(quick) = f.quick() {
-                assert_eq!(quick.level(v), level, "{}", p.name());
+            if let Some(curve) = f.curve() {
+                assert_eq!(curve.level(v), level, "{}", p.name());
             }
             if let Some(e) = f.exponential() {
                 let curve = e.sliding + (e.at_rest - e.sliding) * (-v.abs() / e.velocity).exp();
@@ -50,7 +50,8 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
     let named = |p: fn(&Friction<f64>) -> bool| -> Vec<&str> {
         FrictionParams::all().iter().filter(|q| p(&Friction::build(q).unwrap())).map(Choice::name).collect()
     };
-    assert_eq!(named(|f| f.quick().is_some()), ["stribeck", "dahl"]);
+    assert_eq!(named(|f| f.curve().is_some()), ["stribeck", "lugre", "dahl", "elasto_plastic", "maxwell"]);
+    assert_eq!(named(|f| f.curve().is_some_and(|curve| curve.is_quick())), ["stribeck", "dahl"]);
     assert_eq!(named(|f| f.exponential().is_some()), ["stribeck", "coulomb"]);
     assert_eq!(named(|f| f.falls().is_some()), ["stribeck", "coulomb"]);
     assert_eq!(named(|f| f.bristles().is_some()), ["lugre", "dahl", "elasto_plastic", "maxwell"]);

@@ -36,7 +36,8 @@ pub struct Ctc<T> {
     model: Plant<T>,
     /// (11) as it is printed will do: a brake that does not drag.
     printed: bool,
-    /// `printed`, and the friction is the curve below.
+    /// `printed`, and the friction is the curve below; `quick` if that is computed without a power.
+    curved: bool,
     quick: bool,
     curve: Stribeck<T>,
     output: Output<T>,
@@ -57,14 +58,15 @@ impl<T: Real> Ctc<T> {
         let model = Plant::new(model)?;
         model.check_solvable()?;
         let printed = model.actuator().kind() == ActuatorKind::Brake && model.actuator().preload() == T::ZERO;
-        let curve = model.friction().quick();
-        let quick = printed && curve.is_some();
+        let curve = model.friction().curve();
+        let curved = printed && curve.is_some();
+        let quick = curved && curve.is_some_and(|curve| curve.is_quick());
         let curve = match curve {
             Some(curve) => curve,
             // Not asked.
             None => Stribeck::new(&StribeckParams::default())?,
         };
-        Ok(Ctc { params: *p, model, printed, quick, curve, output: Output::new(output, period)? })
+        Ok(Ctc { params: *p, model, printed, curved, quick, curve, output: Output::new(output, period)? })
     }
 
     /// The believed plant. It differs from the true one wherever friction is not known.
@@ -88,9 +90,9 @@ impl<T: Arithmetic> Ctc<T> {
         let all = |is: fn(&Self) -> bool| {
             L::all(L::ONE.less_or_equal(each(&|law| if is(law) { T::ONE } else { T::ZERO })))
         };
-        let (printed, quick) = (all(|law| law.printed), all(|law| law.quick));
+        let [printed, curved, quick] = [all(|law| law.printed), all(|law| law.curved), all(|law| law.quick)];
         let curve = Stribeck::in_lanes(&|get| each(&|law| get(&law.curve)));
-        Some(Ctc { params, model, printed, quick, curve, output })
+        Some(Ctc { params, model, printed, curved, quick, curve, output })
     }
 
     #[inline]
@@ -133,6 +135,16 @@ impl<T: Arithmetic> Ctc<T> {
     /// Apart: a call of the power among what a tick computes makes the others slower, too.
     #[cold]
     #[inline(never)]
+    fn command_by_power(&self, state: &mut OutputState<T>, tick: &Tick<T>) -> Command<T, [T; 3]> {
+        if !self.curved {
+            return self.command_for_any(state, tick);
+        }
+        self.command(state, self.terms(tick, self.curve.level_by_power(tick.velocity())))
+    }
+
+    /// Apart: a curve does not pay for the choice of a friction.
+    #[cold]
+    #[inline(never)]
     fn command_for_any(&self, state: &mut OutputState<T>, tick: &Tick<T>) -> Command<T, [T; 3]> {
         self.command(state, self.terms_for_any(tick))
     }
@@ -154,7 +166,7 @@ impl<T: Arithmetic> ControlLaw<T> for Ctc<T> {
             let mu = self.curve.quick_level(tick.velocity());
             return self.command(state, self.terms(tick, mu));
         }
-        self.command_for_any(state, tick)
+        self.command_by_power(state, tick)
     }
 }
 
