@@ -3,9 +3,8 @@
 
 use clutch_core::supervisor::{BoardMode, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Planned, Real, SupervisorState, Target};
-use clutch_log::Record;
+use clutch_log::{CommandRecord, Record, SampleRecord};
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_loop::to_log;
 use clutch_node::{ControllerNode, Notice, Outbox};
 use clutch_sim::Scenario;
 use clutch_wire::{Armed, BoardState, Configured, Frame, Message, Sample as SampleFrame, encode};
@@ -122,8 +121,9 @@ fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned
             let bytes = frame(tick);
             controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
-                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n, radians)));
-                    let _ = ring.push(Record::Command(to_log::command(tick, &n.cycle, servo.dac(), radians)));
+                    let _ = ring.push(Record::Sample(SampleRecord::of(&n, tick, 0, 0, radians)));
+                    let _ =
+                        ring.push(Record::Command(CommandRecord::of(&n.cycle, tick, servo.dac(), radians)));
                 }
             });
             tick += 1;

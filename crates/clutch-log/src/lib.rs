@@ -15,6 +15,7 @@ mod record;
 mod recover;
 mod scan;
 mod sync;
+mod values;
 mod write;
 
 pub use cells::{Cells, word};

@@ -3,7 +3,11 @@
 //! and the columns of Python.
 
 use crate::channel::{Channel, Field, Kind, Value};
-use crate::names;
+use crate::names::{self, EventKind};
+use crate::values::{of_law, position, source};
+use clutch_core::supervisor::Cycle;
+use clutch_core::{Dac, FixedCounts, Real, law};
+use clutch_node::{CycleNotice, Ending, LinkCounts, Standing};
 use prost::Message;
 
 /// The most terms that a law has in a log.
@@ -123,19 +127,42 @@ macro_rules! kind {
     };
 }
 
+/// The function that makes a record of what there is in a run, if its table says of what.
+macro_rules! made {
+    ($record:ident {} $($rest:tt)*) => {};
+    ($record:ident {(
+        [$($of:tt)*] ($($arg:ident: $type:ty),*) at ($tick:expr, $time_ns:expr)
+    )} $($field:ident {$($value:expr)?})*) => {
+        impl $record {
+            /// Made of what there is in a run, at its time, ns; what is not known there is 0.
+            #[must_use]
+            #[allow(clippy::needless_update, reason = "of some records all is known")]
+            pub fn of<$($of)*>($($arg: $type),*) -> $record {
+                $record {
+                    tick: $tick,
+                    time_ns: $time_ns,
+                    $($($field: $value,)?)*
+                    ..$record::default()
+                }
+            }
+        }
+    };
+}
+
 /// The table. A row is: meaning; number in the message, name in the log, field of the record, its type, protobuf's type
-/// (for the encoder an `optional` one keeps each zero); of a small number its enum's name and the names of the values.
-/// Below the rows are the numbers and names of the law's terms, if the record has them.
+/// (for the encoder an `optional` one keeps each zero); of a small number its enum's name and the names of the values; its
+/// value in a run, where the head says of what the record is made. Below the rows are the numbers and names of the law's
+/// terms, if the record has them.
 macro_rules! records {
     ($(
         $(#[doc = $doc:literal])*
-        $variant:ident = $record:ident, $topic:literal, $content:literal {
+        $variant:ident = $record:ident, $topic:literal, $content:literal $(of $of:tt)? {
             $(
                 #[doc = $meaning:literal]
                 $tag:tt $name:ident = $field:ident: $type:ty, $proto:ident $(($optional:ident))?
-                    $(of $enum:literal $names:path)?;
+                    $(of $enum:literal $names:path)? $(, $value:expr)?;
             )*
-            $($terms:ident { $(#[doc = $term_meaning:literal] $term_tag:tt $term:ident;)* })?
+            $($terms:ident ($terms_value:expr) { $(#[doc = $term_meaning:literal] $term_tag:tt $term:ident;)* })?
         }
     )*) => {
         /// One record, without heap: it goes through the ring from the control thread.
@@ -204,6 +231,8 @@ macro_rules! records {
                     pub $terms: Terms,
                 )?
             }
+
+            made!($record {$($of)?} $($field {$($value)?})* $($terms {$terms_value})?);
 
             impl InChannel for $record {
                 const CHANNEL: Channel = Channel {
@@ -278,55 +307,65 @@ macro_rules! records {
 
 records! {
     /// A measurement as it came from the board.
-    Sample = SampleRecord, "/sample", "The measurement of a tick, or its absence." {
+    Sample = SampleRecord, "/sample", "The measurement of a tick, or its absence."
+        of ([T: Real, X](n: &CycleNotice<T, X>, time_ns: u64, age_us: u32, wake_us: u32, radians_per_count: f64)
+            at (n.cycle.tick, time_ns))
+    {
         /// Arrival of the sample.
-        2 arrival = arrival: u8, uint32 of "Arrival" names::ARRIVALS;
+        2 arrival = arrival: u8, uint32 of "Arrival" names::ARRIVALS, n.cycle.arrival as u8;
         /// The board's sequence number, wraps at 2^16.
-        3 sequence = sequence: u16, uint32;
+        3 sequence = sequence: u16, uint32, n.sample.sequence;
         /// The board's clock at the measurement, µs, wraps at 2^32.
-        4 board_time_us = board_time_us: u32, uint32;
+        4 board_time_us = board_time_us: u32, uint32, n.sample.time_us;
         /// Encoder counts, wrap at 2^32.
-        5 counts = counts: i32, sint32;
+        5 counts = counts: i32, sint32, n.sample.counts;
         /// The board's status bits.
-        6 status = status: u8, uint32;
+        6 status = status: u8, uint32, n.sample.status;
         /// Age of the sample when it was used, µs.
-        7 age_us = age_us: u32, uint32;
+        7 age_us = age_us: u32, uint32, age_us;
         /// Time that the answer to the sample before took, µs.
-        8 lateness_us = lateness_us: u32, uint32;
+        8 lateness_us = lateness_us: u32, uint32, n.lateness.0;
         /// A newer sample had come with it; not answered.
-        9 superseded = superseded: bool, bool;
+        9 superseded = superseded: bool, bool, n.superseded;
         /// Lateness of the wake-up that brought it, µs; 0 where it is not known.
-        10 wake_us = wake_us: u32, uint32;
+        10 wake_us = wake_us: u32, uint32, wake_us;
         /// Position that the counts show, on the target's turn of the counter, rad.
-        11 position_rad = position: f64, double (optional);
+        11 position_rad = position: f64, double (optional),
+            position(n.sample.counts, n.cycle.target.position, radians_per_count);
     }
     /// A command, with the values that led the law to it.
-    Command = CommandRecord, "/command", "The command of a tick, with every term of the law." {
+    Command = CommandRecord, "/command", "The command of a tick, with every term of the law."
+        of ([T: Real, X: law::Terms<T>](cycle: &Cycle<T, X>, time_ns: u64, dac: &Dac<T>, radians_per_count: f64)
+            at (cycle.tick, time_ns))
+    {
         /// State of the supervisor.
-        2 state = state: u8, uint32 of "State" names::STATES;
+        2 state = state: u8, uint32 of "State" names::STATES, cycle.state as u8;
         /// Origin of the code.
-        3 source = source: u8, uint32 of "Source" names::COMMAND_SOURCES;
+        3 source = source: u8, uint32 of "Source" names::COMMAND_SOURCES, source(cycle) as u8;
         /// Effect of the output stage on the demand.
-        4 limit = limit: u8, uint32 of "Limit" names::LIMITS;
+        4 limit = limit: u8, uint32 of "Limit" names::LIMITS,
+            cycle.output.as_ref().map_or(0, |out| out.command.limit as u8);
         /// Code for the converter.
-        5 code = code: u16, uint32;
+        5 code = code: u16, uint32, cycle.code.0;
         /// Voltage of the code, V.
-        6 voltage_v = voltage: f64, double (optional);
+        6 voltage_v = voltage: f64, double (optional), dac.volts(cycle.code).to_f64();
         /// The law's output before limits, V.
-        7 demand_v = demand: f64, double (optional);
+        7 demand_v = demand: f64, double (optional), of_law(cycle, |out| out.command.voltage);
         /// Target position, 2^-16 counts.
-        8 target_counts_x65536 = target_fixed: i64, sint64;
+        8 target_counts_x65536 = target_fixed: i64, sint64, cycle.target.position.0;
         /// Target position, rad.
-        9 target_position_rad = target_position: f64, double (optional);
+        9 target_position_rad = target_position: f64, double (optional),
+            cycle.target.position.minus::<f64>(FixedCounts(0)) * radians_per_count;
         /// Target velocity, rad/s.
-        10 target_velocity_rad_s = target_velocity: f64, double (optional);
+        10 target_velocity_rad_s = target_velocity: f64, double (optional), cycle.target.velocity.to_f64();
         /// Target acceleration, rad/s².
-        11 target_acceleration_rad_s2 = target_acceleration: f64, double (optional);
+        11 target_acceleration_rad_s2 = target_acceleration: f64, double (optional),
+            cycle.target.acceleration.to_f64();
         /// Position error as the law saw it, rad.
-        12 error_rad = error: f64, double (optional);
+        12 error_rad = error: f64, double (optional), of_law(cycle, |out| out.tick.error);
         /// Rate of the error as the law saw it, rad/s.
-        13 error_rate_rad_s = error_rate: f64, double (optional);
-        terms {
+        13 error_rate_rad_s = error_rate: f64, double (optional), of_law(cycle, |out| out.tick.error_rate);
+        terms (cycle.output.iter().flat_map(|out| out.command.terms.values()).map(|term| term.to_f64()).collect()) {
             /// The law's first term; the file has the law's name for it, and as many terms as the law.
             14 term_0;
             /// The law's second term, likewise.
@@ -346,38 +385,42 @@ records! {
         }
     }
     /// A report of the supervisor, the gate, the log or the port.
-    Event = EventRecord, "/event", "A report of the supervisor, the gate, the log or the port." {
+    Event = EventRecord, "/event", "A report of the supervisor, the gate, the log or the port."
+        of ([T: Real](kind: EventKind, e: &Ending<T>, time_ns: u64) at (e.tick, time_ns))
+    {
         /// Kind of event.
-        2 kind = kind: u8, uint32 of "Kind" names::EVENT_KINDS;
+        2 kind = kind: u8, uint32 of "Kind" names::EVENT_KINDS, kind as u8;
         /// State before.
-        3 from_state = from: u8, uint32 of "State" names::STATES;
+        3 from_state = from: u8, uint32 of "State" names::STATES, e.from as u8;
         /// State after.
-        4 to_state = to: u8, uint32 of "State" names::STATES;
+        4 to_state = to: u8, uint32 of "State" names::STATES, e.state as u8;
         /// Cause of the event.
-        5 cause = cause: u8, uint32 of "Cause" names::CAUSES;
+        5 cause = cause: u8, uint32 of "Cause" names::CAUSES, e.cause as u8;
         /// Value that the check saw, in the check's unit.
-        6 value = value: f64, double (optional);
+        6 value = value: f64, double (optional), e.value.to_f64();
     }
     /// Counters of the link, since the start of the run.
-    Link = LinkRecord, "/link", "Counters since the start of the run." {
+    Link = LinkRecord, "/link", "Counters since the start of the run."
+        of ([T](counts: &LinkCounts, standing: &Standing<T>, time_ns: u64, log_dropped: u64) at (standing.tick, time_ns))
+    {
         /// Samples received.
-        2 received = received: u64, uint64;
+        2 received = received: u64, uint64, counts.received;
         /// Samples that never came.
-        3 lost = lost: u64, uint64;
+        3 lost = lost: u64, uint64, standing.lost;
         /// Samples after their deadline.
-        4 late = late: u64, uint64;
+        4 late = late: u64, uint64, counts.late;
         /// Samples that came twice.
-        5 duplicated = duplicated: u64, uint64;
+        5 duplicated = duplicated: u64, uint64, counts.duplicated;
         /// Samples that came after a newer one.
-        6 reordered = reordered: u64, uint64;
+        6 reordered = reordered: u64, uint64, counts.reordered;
         /// Frames with a wrong checksum, length or type.
-        7 rejected_frames = rejected_frames: u64, uint64;
+        7 rejected_frames = rejected_frames: u64, uint64, counts.bad_frames;
         /// Samples refused by the plausibility gate.
-        8 rejected_samples = rejected_samples: u64, uint64;
+        8 rejected_samples = rejected_samples: u64, uint64, standing.rejected;
         /// Cycles that ended after their deadline.
-        9 deadline_misses = deadline_misses: u64, uint64;
+        9 deadline_misses = deadline_misses: u64, uint64, standing.deadline_misses;
         /// Records that the full ring dropped.
-        10 log_dropped = log_dropped: u64, uint64;
+        10 log_dropped = log_dropped: u64, uint64, log_dropped;
     }
     /// A parameter that was changed while the loop ran.
     Change = ChangeRecord, "/change", "A parameter that was changed while the loop ran." {

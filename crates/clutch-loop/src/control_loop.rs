@@ -25,7 +25,7 @@ use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Arithmetic, Micros, Real};
-use clutch_log::{ChangeRecord, CommandRecord, EventKind, EventRecord, Record, SampleRecord};
+use clutch_log::{ChangeRecord, CommandRecord, EventKind, EventRecord, LinkRecord, Record, SampleRecord};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::detected::Detector;
@@ -443,9 +443,9 @@ impl<'a, S: Station> Control<'a, S> {
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
             let wake_us = u32::try_from(late / 1000).unwrap_or(u32::MAX);
-            let sample = SampleRecord { wake_us, ..to_log::sample(time_ns, age, n, self.radians) };
+            let sample = SampleRecord::of(n, time_ns, age, wake_us, self.radians);
             let mut records = [Record::Sample(sample); 3];
-            let command = to_log::command(time_ns, &n.cycle, &self.dac, self.radians);
+            let command = CommandRecord::of(&n.cycle, time_ns, &self.dac, self.radians);
             records[1] = Record::Command(command);
             let change = to_log::change(time_ns, &n.cycle);
             let used = if let Some(change) = change {
@@ -538,8 +538,8 @@ impl<'a, S: Station> Control<'a, S> {
     /// Once a second: the link's counters, the board's clock.
     fn housekeeping(&mut self, now: u64) {
         let state = self.station.standing();
-        let others = (state.lost, state.rejected, state.deadline_misses, self.dropped);
-        let link = to_log::link(now.saturating_sub(self.start_ns), state.tick, self.station.counts(), others);
+        let time_ns = now.saturating_sub(self.start_ns);
+        let link = LinkRecord::of(self.station.counts(), &state, time_ns, self.dropped);
         self.push(&[Record::Link(link)]);
         self.pings = self.pings.wrapping_add(1);
         self.station.ping(self.pings, &mut self.out);
@@ -671,6 +671,7 @@ impl<'a, S: Station> Control<'a, S> {
         match standing.state {
             State::Ready => {}
             State::Running | State::Armed => {
+                self.begun = true;
                 if self.watch.stop.load(Ordering::Relaxed) {
                     self.stop(StopReason::Operator);
                 } else if now >= due.second {

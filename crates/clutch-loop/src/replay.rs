@@ -4,7 +4,7 @@ use crate::build_error::BuildError;
 use crate::drift::{Drift, DriftReport};
 use crate::from_scenario::{self, BuiltRun};
 use crate::live_gains;
-use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, REPORT_EVERY, START_VOLTAGE};
+use crate::to_log::{FOREIGN_LAW, PRESENT_CODE, REPORT_EVERY, START_VOLTAGE};
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{
@@ -288,7 +288,7 @@ fn looped<T: Real>(
         }
         let planned = BeginningAt { planned: &path, origin };
         let cycle = supervisor.sample(&servo, &mut state, &seen(sample), planned);
-        commands.push(to_log::command(sample.time_ns, &cycle, servo.dac(), radians));
+        commands.push(CommandRecord::of(&cycle, sample.time_ns, servo.dac(), radians));
     }
     Ok(commands)
 }
@@ -348,7 +348,7 @@ fn simulated<T: Real, C: ControlLaw<T>>(
             let map = |position| spec.friction_map.map_or_else(Place::default, |map| map.at(position));
             let output = servo.tick_on(&mut state, Counts(sample.counts), &target, map);
             let cycle = simulated_cycle(sample.tick, target, output);
-            Ok(to_log::command(sample.time_ns, &cycle, servo.dac(), radians))
+            Ok(CommandRecord::of(&cycle, sample.time_ns, servo.dac(), radians))
         })
         .collect()
 }

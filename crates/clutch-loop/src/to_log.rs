@@ -4,18 +4,20 @@ use crate::build_error::BuildError;
 use crate::drift::Alarm;
 use crate::from_scenario;
 use crate::onlooker::Looking;
-use clutch_core::law::Terms;
-use clutch_core::supervisor::{Cause, Cycle, State};
-use clutch_core::{Dac, FixedCounts, Real, Servo};
+use clutch_core::law::{Command, Terms, Tick};
+use clutch_core::supervisor::{Arrival, Cause, Cycle, State};
+use clutch_core::{Dac, DacCode, Micros, Real, Servo, ServoOutput, Target};
 use clutch_log::{
-    CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, LogError, LogWriter, Record,
-    SampleRecord, Source, TruthRecord,
+    CommandRecord, EventKind, EventRecord, Header, LogError, LogWriter, MAX_TERMS, Record, SampleRecord,
+    Source, TruthRecord,
 };
-use clutch_node::{CycleNotice, Ending, LinkCounts};
+use clutch_node::{CycleNotice, Ending};
 use clutch_sim::engine::Motion;
 use clutch_sim::progress::{Progress, Report};
+use clutch_sim::run::Trace;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{MovingRig, Scenario};
+use clutch_wire::{BoardState, Sample};
 use std::path::Path;
 
 /// Key of the header under which the code at arming stands.
@@ -24,79 +26,6 @@ pub const PRESENT_CODE: &str = "present_code";
 pub const START_VOLTAGE: &str = "start_voltage_bits";
 /// Name of the law in a log's header, if it is none of clutch's: the scenario's own law then did not run.
 pub const FOREIGN_LAW: &str = "foreign_law";
-
-/// A sample as it came.
-#[must_use]
-pub fn sample<T: Real, X>(
-    time_ns: u64,
-    age_us: u32,
-    n: &CycleNotice<T, X>,
-    radians_per_count: f64,
-) -> SampleRecord {
-    SampleRecord {
-        tick: n.cycle.tick,
-        time_ns,
-        arrival: n.cycle.arrival as u8,
-        sequence: n.sample.sequence,
-        board_time_us: n.sample.time_us,
-        counts: n.sample.counts,
-        status: n.sample.status,
-        age_us,
-        lateness_us: n.lateness.0,
-        superseded: n.superseded,
-        wake_us: 0,
-        position: position(n.sample.counts, n.cycle.target.position, radians_per_count),
-    }
-}
-
-/// The position that counts show, rad. They wrap at 2³² and a target does not: of the positions that they can be it is the
-/// one nearest to the target.
-fn position(counts: i32, target: FixedCounts, radians_per_count: f64) -> f64 {
-    const WRAPS: u32 = i64::BITS - i32::BITS - FixedCounts::FRACTION_BITS;
-    let counts = FixedCounts::from_counts(i64::from(counts));
-    let behind = target.0.wrapping_sub(counts.0) << WRAPS >> WRAPS;
-    let position = FixedCounts(target.0.wrapping_sub(behind));
-    position.minus::<f64>(FixedCounts(0)) * radians_per_count
-}
-
-/// The command that a sample led to. Every real is a double; a number in single precision is one
-/// exactly.
-#[must_use]
-pub fn command<T: Real, X: Terms<T>>(
-    time_ns: u64,
-    cycle: &Cycle<T, X>,
-    dac: &Dac<T>,
-    radians_per_count: f64,
-) -> CommandRecord {
-    let safe = matches!(cycle.state, State::Holding | State::Released | State::Faulted);
-    let source = match (safe, cycle.output.is_some()) {
-        (true, _) => CommandSource::Safe,
-        (false, true) => CommandSource::Law,
-        (false, false) => CommandSource::Unanswered,
-    };
-    let target = cycle.target;
-    let mut record = CommandRecord {
-        tick: cycle.tick,
-        time_ns,
-        state: cycle.state as u8,
-        source: source as u8,
-        code: cycle.code.0,
-        voltage: dac.volts(cycle.code).to_f64(),
-        target_fixed: target.position.0,
-        target_position: target.position.minus::<f64>(FixedCounts(0)) * radians_per_count,
-        target_velocity: target.velocity.to_f64(),
-        target_acceleration: target.acceleration.to_f64(),
-        ..CommandRecord::default()
-    };
-    if let Some(out) = &cycle.output {
-        record.limit = out.command.limit as u8;
-        record.demand = out.command.voltage.to_f64();
-        record.error = out.tick.error.to_f64();
-        record.error_rate = out.tick.error_rate.to_f64();
-        record.terms = out.command.terms.values().iter().map(|value| value.to_f64()).collect();
-    }
-    record
-}
 
 /// A change of the supervisor's state, if this was one.
 #[must_use]
@@ -120,15 +49,53 @@ pub fn drift(time_ns: u64, state: State, alarm: &Alarm) -> Record {
 }
 
 fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
-    Record::Event(EventRecord {
-        tick: e.tick,
-        time_ns,
-        kind: kind as u8,
-        from: e.from as u8,
-        to: e.state as u8,
-        cause: e.cause as u8,
-        value: e.value.to_f64(),
-    })
+    Record::Event(EventRecord::of(kind, e, time_ns))
+}
+
+/// Terms as a trace has them.
+#[derive(Clone, Copy, Default)]
+struct Traced<T> {
+    values: [T; MAX_TERMS],
+    count: usize,
+}
+
+impl<T: Real> Terms<T> for Traced<T> {
+    fn values(&self) -> &[T] {
+        &self.values[..self.count]
+    }
+}
+
+impl<T: Real> Traced<T> {
+    fn at(trace: &Trace, i: usize) -> Self {
+        let mut terms = Traced { values: [T::ZERO; MAX_TERMS], count: trace.terms.len().min(MAX_TERMS) };
+        for (value, (_, traced)) in terms.values.iter_mut().zip(&trace.terms) {
+            *value = T::from_f64(traced[i]);
+        }
+        terms
+    }
+}
+
+/// The cycle of a simulation's sample, as a controller would report it. The law's numbers were of its scalar before the
+/// trace had them, and the target was rounded to it before the law saw it.
+fn cycle<T: Real>(t: &Trace, i: usize) -> Cycle<T, Traced<T>> {
+    let [error, error_rate] = [t.measured_error[i], t.error_rate[i]].map(T::from_f64);
+    let [velocity, acceleration] = [t.target_velocity[i], t.target_acceleration[i]].map(T::from_f64);
+    let tick = Tick { error, error_rate, target_velocity: velocity, target_acceleration: acceleration };
+    let code = DacCode(t.code[i]);
+    let voltage = T::from_f64(t.demand[i]);
+    let command = Command { voltage, limit: t.limit[i], terms: Traced::at(t, i) };
+    Cycle {
+        tick: i as u64,
+        arrival: Arrival::Fresh,
+        from: State::Running,
+        state: State::Running,
+        cause: Cause::None,
+        value: T::ZERO,
+        answer: Some(code),
+        code,
+        target: Target { position: t.target_fixed[i], velocity, acceleration },
+        output: Some(ServoOutput { code, tick, command }),
+    }
 }
 
 /// Records of a simulation: every sample with its command and the shaft's true state.
@@ -136,43 +103,25 @@ fn of_simulation<T: Real>(
     run: &clutch_sim::Run,
     dac: Dac<T>,
     radians_per_count: f64,
-    period: clutch_core::Micros,
+    period: Micros,
 ) -> impl Iterator<Item = [Record; 3]> {
     let t = &run.trace;
-    let period_ns = u64::from(period.0) * 1000;
+    let period_us = u64::from(period.0);
     (0..t.time.len()).map(move |i| {
         let tick = i as u64;
-        let time_ns = tick * period_ns;
-        // A target was rounded to the law's scalar before the law saw it.
-        let cast = |x: f64| T::from_f64(x).to_f64();
+        let time_ns = tick * period_us * 1000;
+        let cycle = cycle::<T>(t, i);
+        let sample = Sample {
+            run: 0,
+            sequence: tick as u16,
+            time_us: (tick * period_us) as u32,
+            counts: t.counts[i],
+            status: BoardState::Running as u8,
+        };
+        let notice = CycleNotice { sample, superseded: false, lateness: Micros(0), cycles: 0, cycle };
         [
-            Record::Sample(SampleRecord {
-                tick,
-                time_ns,
-                sequence: tick as u16,
-                board_time_us: (time_ns / 1000) as u32,
-                counts: t.counts[i],
-                status: clutch_wire::BoardState::Running as u8,
-                position: position(t.counts[i], t.target_fixed[i], radians_per_count),
-                ..SampleRecord::default()
-            }),
-            Record::Command(CommandRecord {
-                tick,
-                time_ns,
-                state: State::Running as u8,
-                source: CommandSource::Law as u8,
-                limit: t.limit[i] as u8,
-                code: t.code[i],
-                voltage: dac.volts(clutch_core::DacCode(t.code[i])).to_f64(),
-                demand: t.demand[i],
-                target_fixed: t.target_fixed[i].0,
-                target_position: t.target_position[i],
-                target_velocity: cast(t.target_velocity[i]),
-                target_acceleration: cast(t.target_acceleration[i]),
-                error: t.measured_error[i],
-                error_rate: t.error_rate[i],
-                terms: t.terms.iter().map(|(_, values)| values[i]).collect(),
-            }),
+            Record::Sample(SampleRecord::of(&notice, time_ns, 0, 0, radians_per_count)),
+            Record::Command(CommandRecord::of(&notice.cycle, time_ns, &dac, radians_per_count)),
             Record::Truth(TruthRecord {
                 tick,
                 time_ns,
@@ -305,30 +254,6 @@ fn save_in<T: Real>(
     Ok(())
 }
 
-/// The link's counters; `(lost, implausible, deadline misses, dropped by the log)` come from
-/// elsewhere.
-#[must_use]
-pub fn link(
-    time_ns: u64,
-    tick: u64,
-    counts: &LinkCounts,
-    (lost, rejected_samples, deadline_misses, log_dropped): (u64, u64, u64, u64),
-) -> LinkRecord {
-    LinkRecord {
-        tick,
-        time_ns,
-        received: counts.received,
-        lost,
-        late: counts.late,
-        duplicated: counts.duplicated,
-        reordered: counts.reordered,
-        rejected_frames: counts.bad_frames,
-        rejected_samples,
-        deadline_misses,
-        log_dropped,
-    }
-}
-
 /// The shaft as it truly is.
 #[must_use]
 pub fn truth(time_ns: u64, tick: u64, rig: &MovingRig) -> TruthRecord {
@@ -339,23 +264,5 @@ pub fn truth(time_ns: u64, tick: u64, rig: &MovingRig) -> TruthRecord {
         position: shaft.position,
         velocity: shaft.velocity,
         stuck: shaft.motion == Motion::Stuck,
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::float_cmp, reason = "exact")]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_that_wrapped_are_positions_beside_the_target() {
-        let at = |counts, target| position(counts, FixedCounts::from_counts(target), 0.5);
-        assert_eq!((at(7, 9), at(-7, 9)), (3.5, -3.5));
-        let turn = 1_i64 << 32;
-        assert_eq!(at(i32::MIN, i64::from(i32::MAX)), (turn / 2) as f64 * 0.5);
-        assert_eq!(at(i32::MAX, -turn / 2), (-turn / 2 - 1) as f64 * 0.5);
-        assert_eq!(at(-3, 5 * turn), (5 * turn - 3) as f64 * 0.5);
-        // The target's fraction is not the encoder's.
-        assert_eq!(position(7, FixedCounts(9 << 16 | 0xffff), 0.5), 3.5);
     }
 }

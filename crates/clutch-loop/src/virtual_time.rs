@@ -539,8 +539,8 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
                 }
                 report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
                 let records = &mut heard.records;
-                records.push(Record::Sample(to_log::sample(time_ns, 0, &n, radians)));
-                records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
+                records.push(Record::Sample(SampleRecord::of(&n, time_ns, 0, 0, radians)));
+                records.push(Record::Command(CommandRecord::of(&n.cycle, time_ns, &dac, radians)));
                 records.extend(to_log::change(time_ns, &n.cycle));
                 records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, board.rig())));
             }
