@@ -42,6 +42,9 @@ pub(crate) fn run() -> Result<()> {
     }
     apply(&tree, TESTS)?;
     cargo(["xtask", "generate"]).within(&tree).run()?;
+    // More laws have more bits.
+    let bits = ["test", "--package", "clutch-core", "--features", "linalg", "--test", "bits"];
+    cargo(bits).env("CLUTCH_BITS", "write").within(&tree).run()?;
     cargo(["test", "--workspace", "--tests", "--no-fail-fast", "--"]).args(OF_PAGES).within(&tree).run()?;
     used(&tree)?;
     println!("\n{}", table.join("\n"));

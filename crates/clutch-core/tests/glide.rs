@@ -7,84 +7,11 @@
 )]
 
 use clutch_core::law::{GlideParams, LawParams, Terms};
-use clutch_core::{
-    Counts, FixedCounts, FrictionMap, MotorActuator, OnDisc, Place, Planned, PlantParams, Servo, ServoParams,
-    Target,
-};
+use clutch_core::{FixedCounts, FrictionMap, OnDisc, Place, Planned, Servo, ServoParams, Target};
+use shaft::{Actuator, COUNTS_PER_RADIAN, COUNTS_PER_TURN, PERIOD, Shaft, path, wave};
 use std::collections::VecDeque;
-use std::f64::consts::TAU;
 
-const PERIOD: f64 = 1e-3;
-const COUNTS_PER_TURN: f64 = 20_000.0;
-const COUNTS_PER_RADIAN: f64 = COUNTS_PER_TURN / TAU;
-const PULL: f64 = 0.047_088;
-const INERTIA: f64 = 0.0017;
-const DAMPING: f64 = 0.001;
-const MU: (f64, f64) = (0.2, 0.15);
-const STRIBECK: f64 = 0.001;
-
-/// Torque of a drive and normal force (as torque per unit of μ) of an actuator at a voltage.
-#[derive(Clone, Copy)]
-enum Actuator {
-    Brake,
-    Motor,
-}
-
-impl Actuator {
-    fn acts(self, volts: f64) -> (f64, f64) {
-        match self {
-            Actuator::Brake => (PULL, 0.14 * volts),
-            Actuator::Motor => (0.05 * volts, 0.25),
-        }
-    }
-
-    fn params(self) -> PlantParams {
-        match self {
-            Actuator::Brake => PlantParams::default(),
-            Actuator::Motor => PlantParams {
-                drive_torque: 0.0,
-                actuator: MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 }.into(),
-                ..PlantParams::default()
-            },
-        }
-    }
-}
-
-/// A shaft, by explicit steps of a microsecond.
-struct Shaft {
-    actuator: Actuator,
-    /// Friction, as a multiple of what the law believes, and its ripple along the disc, as a share.
-    friction: f64,
-    ripple: f64,
-    position: f64,
-    velocity: f64,
-}
-
-/// Friction along the disc, as a multiple of the mean, where a map has it.
-fn wave(position: f64, ripple: f64) -> f64 {
-    1.0 + ripple * libm::sin(340.0 * position)
-}
-
-impl Shaft {
-    fn period(&mut self, volts: f64) {
-        const STEPS: u32 = 1000;
-        let dt = PERIOD / f64::from(STEPS);
-        for _ in 0..STEPS {
-            let (drive, normal) = self.actuator.acts(volts);
-            let normal = normal * self.friction * wave(self.position, self.ripple);
-            if self.velocity == 0.0 && drive.abs() <= MU.0 * normal {
-                return;
-            }
-            let way = if self.velocity == 0.0 { drive.signum() } else { self.velocity.signum() };
-            let mu = MU.1 + (MU.0 - MU.1) * libm::exp(-self.velocity.abs() / STRIBECK);
-            let torque = drive - way * mu * normal - DAMPING * self.velocity;
-            let next = self.velocity + dt * torque / INERTIA;
-            // Friction stops a shaft, and does not turn it round.
-            self.velocity = if next * way < 0.0 { 0.0 } else { next };
-            self.position += dt * self.velocity;
-        }
-    }
-}
+mod shaft;
 
 /// A run: the way of the voltage to the shaft, the shaft, the law.
 struct Run {
@@ -104,6 +31,7 @@ impl Run {
             law: GlideParams { micro: 1.0_f64.to_radians(), ..GlideParams::default() },
             delay: 0,
             shaft: Shaft {
+                steps: 1000,
                 actuator,
                 friction: 1.0,
                 ripple: 0.0,
@@ -141,13 +69,13 @@ impl Run {
         let planned = &OnDisc { path: |tick: u64| targets[tick as usize], map };
         let still = if two_sided { 0.0 } else { 5.0 };
         let mut line = VecDeque::from(vec![still; self.delay]);
-        let mut state = servo.start(self.counts(), &targets[0], still);
+        let mut state = servo.start(self.shaft.counts(), &targets[0], still);
         let (mut out, mut parts, mut tick) = (vec![(0.0_f64, 0.0); rates.len()], Vec::new(), 0);
         for (piece, seen) in pieces.iter().zip(&mut out) {
             for k in 0..*piece {
                 let target = target(planned, tick);
-                let answer =
-                    servo.tick_on(&mut state, self.counts(), &target, |position| place(planned, position));
+                let answer = servo
+                    .tick_on(&mut state, self.shaft.counts(), &target, |position| place(planned, position));
                 let part = answer.command.terms.values()[6];
                 if parts.last() != Some(&part) {
                     parts.push(part);
@@ -166,10 +94,6 @@ impl Run {
         }
         (out, parts)
     }
-
-    fn counts(&self) -> Counts {
-        Counts((self.shaft.position * COUNTS_PER_RADIAN).floor() as i32)
-    }
 }
 
 fn target(planned: impl Planned<f64>, tick: u64) -> Target<f64> {
@@ -178,21 +102,6 @@ fn target(planned: impl Planned<f64>, tick: u64) -> Target<f64> {
 
 fn place(planned: impl Planned<f64>, position: FixedCounts) -> Place<f64> {
     planned.place(position)
-}
-
-/// Periods of each of some rates (°/s, each with its seconds), and targets from `start` counts on.
-fn path(start: f64, rates: &[(f64, f64)]) -> (Vec<u32>, Vec<Target<f64>>) {
-    let pieces: Vec<u32> = rates.iter().map(|(_, seconds)| (seconds / PERIOD).round() as u32).collect();
-    let (mut counts, mut targets) = (start, Vec::new());
-    for ((rate, _), periods) in rates.iter().zip(&pieces) {
-        let velocity = rate.to_radians();
-        for _ in 0..*periods {
-            let position = FixedCounts((counts * f64::from(1_u32 << FixedCounts::FRACTION_BITS)) as i64);
-            targets.push(Target { position, velocity, acceleration: 0.0 });
-            counts += velocity * PERIOD * COUNTS_PER_RADIAN;
-        }
-    }
-    (pieces, targets)
 }
 
 /// A count is 0.018°.
