@@ -14,8 +14,8 @@ use clutch_core::params::Choice;
 use clutch_core::supervisor::{BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{
     Bounds, Counts, DacCode, FNV_64, FixedCounts, FrictionMap, Micros, ObserverParams, OnDisc, Real,
-    SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo, ServoParams, SmoothedDerivativeParams,
-    Supervisor, SupervisorParams, SupervisorState, Target, Tolerances, VelocityParams, fnv1a_64,
+    SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
+    SupervisorState, Target, Tolerances, VelocityParams, fnv1a_64,
 };
 use shaft::{Actuator, COUNTS_PER_RADIAN, PERIOD, Shaft, path, wave};
 use std::collections::VecDeque;
@@ -178,27 +178,26 @@ fn decided<T: Real, X: Terms<T>>(hash: u64, cycle: &Cycle<T, X>) -> u64 {
     reals.fold(hash, |hash, real| fnv1a_64(hash, &real.to_f64().to_bits().to_le_bytes()))
 }
 
-/// Each law of the list around either actuator, with each source of velocity in turn, and in a shell.
+/// Each law of the list around either actuator, with each source of velocity, and in a shell.
 fn laws() -> Vec<Run> {
-    let sources = [
-        VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default()),
+    let others = [
         VelocityParams::EdgeTimed(EdgeTimedParams::default()),
         VelocityParams::Observer(ObserverParams::default()),
     ];
     let mut runs = Vec::new();
-    for (place, law) in LawParams::all().into_iter().enumerate() {
-        for (beside, actuator) in [Actuator::Brake, Actuator::Motor].into_iter().enumerate() {
-            let name = Choice::<f64>::name(&law);
-            let title = |with: &str| format!("{name} {}{with}", ["brake", "motor"][beside]);
-            runs.push(Run::new(title(""), law, actuator));
-            let source = sources[1 + (place + beside) % 2];
-            let mut other = Run::new(title(&format!(" {}", source.name())), law, actuator);
-            other.servo.velocity = source;
-            other.targets = sine();
-            (other.delay, other.friction) = (1, 0.95);
-            runs.push(other);
+    for law in LawParams::all() {
+        let name = Choice::<f64>::name(&law);
+        for (actuator, word) in [(Actuator::Brake, "brake"), (Actuator::Motor, "motor")] {
+            runs.push(Run::new(format!("{name} {word}"), law, actuator));
+            for source in others {
+                let mut other = Run::new(format!("{name} {word} {}", source.name()), law, actuator);
+                other.servo.velocity = source;
+                other.targets = sine();
+                (other.delay, other.friction) = (1, 0.95);
+                runs.push(other);
+            }
         }
-        let mut shell = Run::new(format!("{} shell", Choice::<f64>::name(&law)), law, Actuator::Brake);
+        let mut shell = Run::new(format!("{name} shell"), law, Actuator::Brake);
         shell.servo.shell = ShellParams { boundary: 0.1, ..ShellParams::default() };
         runs.push(shell);
     }
