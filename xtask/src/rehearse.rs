@@ -43,7 +43,8 @@ pub(crate) fn run() -> Result<()> {
     apply(&tree, TESTS)?;
     cargo(["xtask", "generate"]).within(&tree).run()?;
     // More laws have more bits.
-    let bits = ["test", "--package", "clutch-core", "--features", "linalg", "--test", "bits"];
+    let bits =
+        ["test", "--package", "clutch-core", "--features", "linalg", "--test", "bits", "--test", "plans"];
     cargo(bits).env("CLUTCH_BITS", "write").within(&tree).run()?;
     cargo(["test", "--workspace", "--tests", "--no-fail-fast", "--"]).args(OF_PAGES).within(&tree).run()?;
     used(&tree)?;

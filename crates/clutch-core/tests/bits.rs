@@ -1,5 +1,5 @@
 //! Each law around a small shaft, behind the supervisor: the bits of every decision are those that are committed. A
-//! change of them is wanted, or it is a mistake; [`bits.txt`](bits.txt) is written anew by `CLUTCH_BITS=write`.
+//! change of them is wanted, or it is a mistake.
 #![cfg(feature = "linalg")]
 #![allow(
     clippy::std_instead_of_core,
@@ -22,6 +22,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 mod shaft;
+mod table;
 
 /// A run: who drives which shaft along which path, and what is wrong with its samples.
 struct Run {
@@ -330,14 +331,5 @@ fn every_decision_has_the_bits_that_are_committed() {
             table += &format!("{hash:016x}  {scalar}  {}: {state:?}, {cause:?}\n", run.name);
         }
     }
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/bits.txt");
-    if std::env::var("CLUTCH_BITS").is_ok_and(|word| word == "write") {
-        std::fs::write(file, &table).unwrap();
-        return;
-    }
-    let committed = std::fs::read_to_string(file).unwrap();
-    for (now, before) in table.lines().zip(committed.lines()) {
-        assert_eq!(now, before, "other bits than those that are committed");
-    }
-    assert_eq!(table.lines().count(), committed.lines().count(), "other runs than those that are committed");
+    table::compare("bits", &table);
 }
