@@ -135,6 +135,11 @@ fn a_parameter_that_may_be_absent_is_there_when_it_is_asked_for() {
     kinds.absent = Some(1.5);
     assert!(kinds.check().is_ok());
     assert_eq!(kinds.cast::<f32>().absent, Some(1.5_f32));
+    let cast = kinds.cast::<f32>();
+    assert_eq!(
+        (cast.share, cast.given, cast.on, cast.kind, cast.big),
+        (0.25, Some(3.0), true, ActuatorKind::Motor, 5)
+    );
     kinds.edit(&mut Seen { present: Some(false), ..Seen::default() });
     assert_eq!(kinds.absent, None);
     // Numbers as errors and tables show them.
