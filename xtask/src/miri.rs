@@ -65,8 +65,12 @@ const LONG: &[&str] = &[
 ];
 
 /// Those that do little in an interpreter.
-const LANES: &[&str] =
-    &["lanes::tests::elementary", "lanes::tests::a_few_periods", "lanes::tests::a_motion_that_stops"];
+const LANES: &[&str] = &[
+    "lane::scalar",
+    "lanes::tests::elementary",
+    "lanes::tests::a_few_periods",
+    "lanes::tests::a_motion_that_stops",
+];
 
 /// Runs each part whose name has a text in it, and adds a row for it to the table.
 pub(crate) fn run(part: &str) -> Result<()> {

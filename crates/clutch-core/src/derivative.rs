@@ -81,7 +81,8 @@ impl<T: Arithmetic> SmoothedDerivative<T> {
     }
 
     /// The next rate from the last one, rad/s, and the difference of the error, counts.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn smooth(&self, rate: T, difference: T) -> T {
         self.keep * rate + self.scale * difference

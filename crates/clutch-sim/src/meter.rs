@@ -251,21 +251,22 @@ impl Meter {
         if low > high {
             return false;
         }
-        let tried =
-            self.frictions.partition_point(|h| *h < low)..self.frictions.partition_point(|h| *h <= high);
-        let Some(frictions) = self.frictions.get(tried) else { return false };
         // A way to a rest and on from it is at most what the largest acceleration makes of the whole time; that is convex
-        // in friction.
+        // in friction. Most gaps of a shaft that runs end here.
         let (gain, whole) = (1.0 + GAIN_DOUBT, track.now.time + 1.0);
-        let comes_so_far = |h: &f64| {
+        let comes_so_far = |h: f64| {
             let of = |pull: f64, load: f64| (sign * pull - h * load).abs();
             let most =
                 track.points().iter().fold(of(pull, load), |most, x| greater(of(x.pull, x.load), most));
             0.5 * (gain * most + slack) * whole * whole > 1.0 - ROUNDING
         };
-        if ![frictions.first(), frictions.last()].into_iter().flatten().any(comes_so_far) {
+        let ends = [greater(low, 1.0 / FRICTION_RANGE), lesser(high, FRICTION_RANGE)];
+        if !ends.into_iter().any(comes_so_far) {
             return false;
         }
+        let tried =
+            self.frictions.partition_point(|h| *h < low)..self.frictions.partition_point(|h| *h <= high);
+        let Some(frictions) = self.frictions.get(tried) else { return false };
         // The least and the highest allow the longest ways: inwards from either end, until ways are too short.
         let mut left = frictions.iter();
         for from_above in [false, true] {

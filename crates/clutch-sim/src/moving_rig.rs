@@ -3,6 +3,7 @@
 //! [`crate::simulate`] steps it from sample to sample; the simulated board steps it by the real
 //! clock, with voltages that change between samples.
 
+use crate::engine::exact_flow::{Bed, Pushed};
 use crate::engine::{
     Bristle, DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
 };
@@ -25,7 +26,8 @@ fn floor(x: f64) -> i64 {
 /// The engine that moves it.
 #[derive(Clone)]
 enum Moves {
-    Exactly(ExactFlow),
+    /// The shaft as the exact flow takes it; none if that refuses the rig.
+    Exactly(Option<Bed<f64>>),
     InSteps(DormandPrince),
     Bending(Bristle),
 }
@@ -73,6 +75,11 @@ fn begin(rig: &Rig, position: f64, velocity: f64, volts: f64) -> Shaft {
     shaft
 }
 
+/// The reason that the exact flow cannot take a rig; `None` if it can.
+fn refuses(rig: &Rig) -> Option<&'static str> {
+    ExactFlow::refuses(&rig.model, rig.drive.is_constant(), rig.params.actuator_time_constant.is_some())
+}
+
 fn noise(seed: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365)
 }
@@ -92,7 +99,9 @@ impl MovingRig {
         let delay = rig.params.delay_ticks as usize;
         MovingRig {
             engine: match engine {
-                EngineKind::ExactFlow => Moves::Exactly(ExactFlow),
+                EngineKind::ExactFlow => {
+                    Moves::Exactly(refuses(&rig).is_none().then(|| Bed::of(&rig.model)).flatten())
+                }
                 EngineKind::DormandPrince | EngineKind::Auto => Moves::InSteps(DormandPrince::default()),
                 EngineKind::Bristle => Moves::Bending(Bristle::default()),
             },
@@ -211,7 +220,15 @@ impl MovingRig {
             };
             let (model, shaft, events) = (&self.rig.model, &mut self.shaft, &mut self.events);
             match &mut self.engine {
-                Moves::Exactly(engine) => engine.advance(model, &input, shaft, events)?,
+                // Torque and voltage are constant: no corner, no zero within the period.
+                Moves::Exactly(Some(bed)) => {
+                    let pushed = Pushed::by(model, &input);
+                    bed.advance(&pushed, (input.time, duration), shaft, events, None)?;
+                }
+                Moves::Exactly(None) => {
+                    let needs = refuses(&self.rig).unwrap_or("a friction that it knows");
+                    return Err(EngineError::Refused(needs));
+                }
                 Moves::InSteps(engine) => engine.advance(model, &input, shaft, events)?,
                 Moves::Bending(engine) => engine.advance(model, &input, shaft, events)?,
             }

@@ -9,7 +9,7 @@ use crate::run::{Keep, Run};
 use crate::scenario::{ScalarKind, Scenario};
 use crate::scenario_error::ScenarioError;
 use fearless_simd::Level;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use toml::{Table, Value};
@@ -106,14 +106,14 @@ impl Sweep {
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
         let next = AtomicUsize::new(0);
-        let batch = self.batch(threads, keep);
+        let deal = Deal::of(self.rows.len(), threads, keep);
         let work = || {
             while !stop.load(Ordering::Relaxed) {
-                let first = next.fetch_add(batch, Ordering::Relaxed);
-                if first >= self.rows.len() {
+                let batch = next.fetch_add(1, Ordering::Relaxed);
+                if batch >= deal.batches {
                     break;
                 }
-                self.some(first..(first + batch).min(self.rows.len()), keep, stop, done);
+                self.some(deal.batch(batch), keep, stop, done);
             }
         };
         std::thread::scope(|scope| {
@@ -127,27 +127,16 @@ impl Sweep {
         });
     }
 
-    /// Rows that a thread takes at once: one by one where samples are kept; else as many as fill lanes if there are so many
-    /// for each thread, and fewer if not.
-    fn batch(&self, threads: usize, keep: Keep) -> usize {
-        let (rows, threads) = (self.rows.len(), threads.max(1));
-        match (keep, rows / (2 * threads)) {
-            (Keep::Trace, _) => 1,
-            (Keep::Figures, n) if n < LANES => rows.div_ceil(threads).clamp(1, LANES),
-            (Keep::Figures, n) => (n - n % LANES).min(BATCH),
-        }
-    }
-
     /// Some rows: those that can in lanes, the others one by one.
     fn some(
         &self,
-        rows: Range<usize>,
+        rows: impl Iterator<Item = usize>,
         keep: Keep,
         stop: &AtomicBool,
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
         let stopped = || stop.load(Ordering::Relaxed);
-        let mut planned = Vec::with_capacity(rows.len());
+        let mut planned = Vec::new();
         for i in rows {
             if stopped() {
                 return;
@@ -186,6 +175,36 @@ impl Sweep {
             }
             done(*i, run.map(|run| Row { certified: *certified, run }));
         }
+    }
+}
+
+/// Rows as threads take them.
+struct Deal {
+    rows: usize,
+    /// Rows that stay together.
+    hand: usize,
+    batches: usize,
+}
+
+impl Deal {
+    /// Rows one by one where samples are kept. Else as many in a batch as fill lanes: few rows are as many batches as there
+    /// are threads, dealt out by the handful, so that none gets the slow end of a table.
+    fn of(rows: usize, threads: usize, keep: Keep) -> Self {
+        let (hand, batches) = match keep {
+            Keep::Trace => (1, rows),
+            Keep::Figures if rows <= threads.max(1) * BATCH => {
+                let hand = rows.div_ceil(threads.max(1)).clamp(1, LANES);
+                (hand, threads.max(1).min(rows.div_ceil(hand)))
+            }
+            Keep::Figures => (BATCH, rows.div_ceil(BATCH)),
+        };
+        Deal { rows, hand, batches }
+    }
+
+    /// The rows of a batch.
+    fn batch(&self, batch: usize) -> impl Iterator<Item = usize> {
+        let hands = (batch * self.hand..self.rows).step_by(self.hand * self.batches);
+        hands.flat_map(|first| first..(first + self.hand).min(self.rows))
     }
 }
 
@@ -237,6 +256,28 @@ mod tests {
             stop.store(true, Ordering::SeqCst);
         });
         assert!((1..=2).contains(&told.load(Ordering::SeqCst)));
+    }
+
+    #[test]
+    fn each_row_is_in_one_batch_and_few_rows_are_dealt_out_evenly() {
+        for rows in (0..40).chain([255, 256, 257, 511, 512, 513, 1025, 4096]) {
+            for threads in [0, 1, 2, 3, 7, 64] {
+                for keep in [Keep::Figures, Keep::Trace] {
+                    let deal = Deal::of(rows, threads, keep);
+                    let batches: Vec<Vec<usize>> =
+                        (0..deal.batches).map(|b| deal.batch(b).collect()).collect();
+                    let mut all = batches.concat();
+                    all.sort_unstable();
+                    assert!(all.into_iter().eq(0..rows), "{rows} rows, {threads} threads, {keep:?}");
+                    let sizes = batches.iter().map(Vec::len);
+                    assert!(sizes.clone().all(|n| (1..=BATCH).contains(&n)));
+                    if keep == Keep::Figures && rows <= threads.max(1) * BATCH {
+                        let (least, most) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
+                        assert!(most - least <= LANES, "{rows} rows, {threads} threads: {least} to {most}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -122,7 +122,8 @@ impl<T: Arithmetic> Stribeck<T> {
     }
 
     /// True where that has come down to its sliding level.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(crate) fn quick_has_vanished(&self, velocity: T) -> T::Mask {
         self.vanishes_at.less_or_equal(velocity.abs() * self.inverse_velocity)
     }

@@ -95,7 +95,8 @@ impl<T: Arithmetic> Ctc<T> {
         Some(Ctc { params, model, printed, curved, quick, curve, output })
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn terms(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
         let (friction_torque, terms) = self.demand(tick, mu);
         (friction_torque / (mu * self.model.actuator().brake_gain()), terms)
@@ -116,7 +117,8 @@ impl<T: Arithmetic> Ctc<T> {
         (actuator.volts_for(-friction_torque, mu, actuator.way(tick.target_velocity)), terms)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn demand(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
         let (p, m) = (&self.params, self.model.params());
         let accel_demand = -(p.outer_gain * (p.kp * tick.error + p.kd * tick.error_rate));
@@ -126,7 +128,8 @@ impl<T: Arithmetic> Ctc<T> {
         (friction_torque, [accel_demand, friction_torque, mu])
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn command(&self, state: &mut OutputState<T>, (demand, terms): (T, [T; 3])) -> Command<T, [T; 3]> {
         let (voltage, limit) = self.output.apply(state, demand);
         Command { voltage, limit, terms }

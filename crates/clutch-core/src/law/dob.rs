@@ -133,12 +133,14 @@ impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
         DobState { disturbance, velocity: tick.velocity(), applied, output: self.output.start(demand, applied) }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn sees(&self, state: &mut DobState<T>, seen: impl FnOnce() -> Seen<T>) {
         state.applied = seen().applied;
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut DobState<T>, tick: &Tick<T>) -> Command<T, [T; 2]> {
         let (tracking, way) = (self.tracking(tick), self.plant.actuator().way(tick.target_velocity));
         let disturbance = state.disturbance;

@@ -71,7 +71,8 @@ impl<T: Arithmetic> ControlLaw<T> for Hold<T> {
         self.output.start(self.volts, applied)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut Self::State, _: &Tick<T>) -> Command<T, [T; 1]> {
         let (voltage, limit) = self.output.apply(state, self.volts);
         Command { voltage, limit, terms: [self.volts] }

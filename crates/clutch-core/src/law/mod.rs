@@ -54,7 +54,8 @@ pub struct Tick<T> {
 
 impl<T: Arithmetic> Tick<T> {
     /// `θ̇ = θ̇_d − ė`: the measured velocity, rad/s.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn velocity(&self) -> T {
         self.target_velocity - self.error_rate

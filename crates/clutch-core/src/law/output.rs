@@ -146,7 +146,8 @@ impl<T: Arithmetic> Output<T> {
     }
 
     /// A law's demand in, the voltage out, V.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn apply(&self, state: &mut OutputState<T>, demand: T) -> (T, T::Limit) {
         let demand = demand + state.offset;
         state.offset = state.offset * self.decay;

@@ -50,7 +50,8 @@ impl<T: Arithmetic> Pd<T> {
         Pd { params: PdParams { kp: each(&|law| law.params.kp), kd: each(&|law| law.params.kd) }, output }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 2]) {
         let proportional = -(self.params.kp * tick.error);
         let derivative = -(self.params.kd * tick.error_rate);
@@ -67,7 +68,8 @@ impl<T: Arithmetic> ControlLaw<T> for Pd<T> {
         self.output.start(self.terms(tick).0, applied)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
         let (demand, terms) = self.terms(tick);
         let (voltage, limit) = self.output.apply(state, demand);

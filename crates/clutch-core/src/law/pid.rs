@@ -123,7 +123,8 @@ impl<T: Arithmetic> Pid<T> {
     }
 
     /// Proportional, derivative and feed-forward part, V.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn parts(&self, tick: &Tick<T>, rate: T) -> (T, T, T) {
         let p = &self.params;
         let way = tick.target_velocity.sgn();
@@ -150,7 +151,8 @@ impl<T: Arithmetic> ControlLaw<T> for Pid<T> {
         PidState { integral, rate: tick.error_rate, output }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut PidState<T>, tick: &Tick<T>) -> Command<T, [T; 5]> {
         state.rate = state.rate + self.newest * (tick.error_rate - state.rate);
         let (proportional, derivative, forward) = self.parts(tick, state.rate);

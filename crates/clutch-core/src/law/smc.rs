@@ -51,7 +51,8 @@ impl<T: Real> Smc<T> {
 }
 
 /// The two parts of a sliding law, of `σ` and `σ ė`: their sum, and `σ` with both.
-#[inline]
+#[cfg_attr(target_os = "none", inline)]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn switched<T: Arithmetic>(
     (kp, kd): (T, T),
     surface: T,
@@ -78,7 +79,8 @@ impl<T: Arithmetic> Smc<T> {
         Smc { params, inverse_boundary: each(&|law| law.inverse_boundary), output }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcParams { kp, kd, slope, .. } = self.params;
         let surface = slope * tick.error + tick.error_rate;
@@ -95,7 +97,8 @@ impl<T: Arithmetic> ControlLaw<T> for Smc<T> {
         self.output.start(self.terms(tick).0, applied)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
         let (demand, terms) = self.terms(tick);
         let (voltage, limit) = self.output.apply(state, demand);

@@ -92,7 +92,8 @@ impl<T: Arithmetic> SmcIntegral<T> {
         }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn terms(&self, integral: T, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcIntegralParams { kp, kd, slope, .. } = self.params;
         let surface = slope * tick.error + tick.error_rate + integral;
@@ -115,7 +116,8 @@ impl<T: Arithmetic> ControlLaw<T> for SmcIntegral<T> {
         SmcIntegralState { integral, output: self.output.start(self.terms(integral, tick).0, applied) }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut SmcIntegralState<T>, tick: &Tick<T>) -> Command<T, [T; 4]> {
         let integral = state.integral;
         let (demand, [surface, switching, damping]) = self.terms(integral, tick);

@@ -55,7 +55,8 @@ impl<T: Arithmetic> SmcSign<T> {
         SmcSign { params, output }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcSignParams { kp, kd, slope } = self.params;
         let surface = slope * tick.error + tick.error_rate;
@@ -72,7 +73,8 @@ impl<T: Arithmetic> ControlLaw<T> for SmcSign<T> {
         self.output.start(self.terms(tick).0, applied)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
         let (demand, terms) = self.terms(tick);
         let (voltage, limit) = self.output.apply(state, demand);

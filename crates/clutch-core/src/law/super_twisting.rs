@@ -85,7 +85,8 @@ impl<T: Arithmetic> SuperTwisting<T> {
     }
 
     /// `σ`, `√|σ| sgn σ` and `sgn σ`, both linear within the layer.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn surface(&self, tick: &Tick<T>) -> (T, T, T) {
         let surface = self.params.slope * tick.error + tick.error_rate;
         let size = surface.abs().max(self.params.boundary);
@@ -110,7 +111,8 @@ impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
         SuperTwistingState { integral, output: self.output.start(root + integral, applied) }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut SuperTwistingState<T>, tick: &Tick<T>) -> Command<T, [T; 3]> {
         let (surface, root, sign) = self.surface(tick);
         let root = -(self.params.k1 * root);

@@ -119,7 +119,8 @@ impl<T: Arithmetic> ControlLaw<T> for Voltage<T> {
         VoltageState { way: T::ZERO, back: T::ZERO, waited: T::ZERO, output }
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn update(&self, state: &mut VoltageState<T>, _: &Tick<T>) -> Command<T, [T; 1]> {
         let level = (self.start + state.way).limit(self.lowest, self.highest);
         let back = T::ZERO.less(state.back);

@@ -96,11 +96,12 @@ pub(crate) struct Slip<'a, V: Lane, P> {
     pub(crate) rounding: V,
 }
 
-/// A step: the state at its end, its error over the tolerance, and the rate at the end (the pair's last stage, which
-/// begins the next step).
+/// A step: the state at its end, its error over the tolerance, the length of the next step over its own by that error, and
+/// the rate at the end (the pair's last stage, which begins the next step).
 pub(crate) struct Step<V> {
     pub(crate) to: State<V>,
     pub(crate) error: V,
+    pub(crate) grows: V,
     pub(crate) rate: State<V>,
 }
 
@@ -174,7 +175,7 @@ impl<V: Lane, P: Push<V>> Slip<'_, V, P> {
         let way = smaller(absolute * (V::ONE + largest[0]), relative * h * largest[1] + rounding);
         let speed = smaller(absolute * (V::ONE + largest[1]), relative * largest[1] + self.rounding * h);
         let error = larger(left_out[0] / way, left_out[1] / larger(speed, V::splat(f64::MIN_POSITIVE)));
-        Step { to, error, rate: k[6] }
+        Step { to, error, grows: V::splat(0.9) * power(error), rate: k[6] }
     }
 }
 
@@ -236,7 +237,7 @@ impl DormandPrince {
             return Err(EngineError::TooManySteps { time, limit: STEP_LIMIT });
         }
         let (length, last) = on.next(end);
-        let Step { to, error, rate } = *step;
+        let Step { to, error, grows, rate } = *step;
         if !(error.is_finite() && to[0].is_finite() && to[1].is_finite()) {
             if length < 1e-15 {
                 return Err(EngineError::NotFinite { time });
@@ -245,13 +246,13 @@ impl DormandPrince {
             return Ok(Outcome::On);
         }
         if error > 1.0 {
-            on.h = length * (0.9 * power(error)).max(0.2);
+            on.h = length * grows.max(0.2);
             return Ok(Outcome::On);
         }
         if sign * to[1] < 0.0 {
             return Ok(Outcome::Stops);
         }
-        let grown = length * (0.9 * power(error)).clamp(0.2, 5.0);
+        let grown = length * grows.clamp(0.2, 5.0);
         if on.at_rest && (!last || grown > self.from_rest) {
             self.from_rest = grown;
         }
@@ -348,15 +349,15 @@ impl DormandPrince {
 
 /// Length of the next step over that of the last, to the order of the pair, for the last one's error; a bound of it where
 /// 0.9 of it is above 5 or below 0.2, which is all that is asked there.
-#[inline]
-fn power(error: f64) -> f64 {
-    if error < 1.8e-4 {
-        6.0
-    } else if error > 2e3 {
-        0.2
-    } else {
-        libm::pow(error, -0.2)
+#[inline(always)]
+fn power<V: Lane>(error: V) -> V {
+    let (small, large) = (error.less(V::splat(1.8e-4)), V::splat(2e3).less(error));
+    let bound = V::select(small, V::splat(6.0), V::splat(0.2));
+    let between = !(small | large);
+    if !V::any(between) {
+        return bound;
     }
+    V::select(between, V::select(between, error, V::ONE).powf(V::splat(-0.2)), bound)
 }
 
 /// Rounding of an acceleration that torques make, rad/s².

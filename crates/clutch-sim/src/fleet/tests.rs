@@ -1,7 +1,7 @@
 //! Fleets in lanes against fleets alone, and these against servo and rig.
 
 use super::*;
-use crate::lanes::levels;
+use crate::lane::vector::levels;
 use crate::lanes::tests::built_in;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;

@@ -1,13 +1,13 @@
 //! A block of runs in lockstep: chunks of as many as a vector has lanes.
 
 use super::candidate::{Candidate, Common};
-use super::elementary::Powers;
 use super::motion::Motions;
 use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
 use super::shafts::Shafts;
 use super::silence::Silence;
-use super::vector::InLanes;
 use crate::detected::STAIR;
+use crate::lane::elementary::Powers;
+use crate::lane::vector::InLanes;
 use crate::lane::{Lane, MOST_LANES};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, Sampled, Sticks};
 use crate::run::REPORT_EVERY;
@@ -58,6 +58,9 @@ impl InLanes for Block<'_, '_> {
         let Some((mut motions, mut chunks)) = Chunk::<V>::all(rows, &common) else {
             return Some(rows.iter().map(|_| None).collect());
         };
+        // Of one path there is one target, and not one for each vector.
+        let first = rows.first().map(|row| &row.path);
+        let shared = first.filter(|first| rows.iter().all(|row| row.path == **first));
         let asks = (REPORT_EVERY / rows.len() as u64).max(1);
         for k in 0..common.ticks {
             if k % asks == 0 {
@@ -69,8 +72,9 @@ impl InLanes for Block<'_, '_> {
                 }
             }
             let time = k as f64 * common.motion.period;
+            let target = shared.map(|path| path.at(k));
             for (n, chunk) in chunks.iter_mut().enumerate() {
-                chunk.sample(k, time, &common, &mut motions.shafts[n]);
+                chunk.sample((k, time), target.as_ref(), &common, &mut motions.shafts[n]);
                 motions.begin(n, time);
             }
             motions.end(time);
@@ -118,25 +122,24 @@ impl<'a, V: Lane> Chunk<'a, V> {
             silences: Silence::new(&StickSlipParams::default(), counts_per_radian * V::splat(period)),
             stairs: Silence::new(&STAIR, counts_per_radian * V::splat(period)),
         };
-        let targets = chunk.targets(0);
+        let targets = chunk.targets(0, None);
         let (_, seen) = chunk.sensors.read(shafts.position);
         chunk.servos.start(!V::none(), seen, &targets, shafts.arriving);
         Some(chunk)
     }
 
-    /// The targets at a tick.
+    /// The targets at a tick; `shared`: the one of the path that all runs of the block have.
     #[inline(always)]
-    fn targets(&self, k: u64) -> Targets<V> {
-        match &self.paths {
-            Paths::Same(path) => {
-                let target = path.at(k);
-                Targets {
-                    position: V::splat(target.position.0 as f64) + self.start,
-                    velocity: V::splat(target.velocity),
-                    acceleration: V::splat(target.acceleration),
-                }
-            }
-            Paths::Each(paths) => {
+    fn targets(&self, k: u64, shared: Option<&Target<f64>>) -> Targets<V> {
+        let all = |target: &Target<f64>| Targets {
+            position: V::splat(target.position.0 as f64) + self.start,
+            velocity: V::splat(target.velocity),
+            acceleration: V::splat(target.acceleration),
+        };
+        match (shared, &self.paths) {
+            (Some(target), _) => all(target),
+            (None, Paths::Same(path)) => all(&path.at(k)),
+            (None, Paths::Each(paths)) => {
                 let mut all = [Target::default(); MOST_LANES];
                 for (target, path) in all.iter_mut().zip(paths) {
                     *target = path.at(k);
@@ -149,8 +152,14 @@ impl<'a, V: Lane> Chunk<'a, V> {
 
     /// Tick `k` begins: sensor, law, converter, figures.
     #[inline(always)]
-    fn sample(&mut self, k: u64, time: f64, common: &Common, shafts: &mut Shafts<V>) {
-        let targets = self.targets(k);
+    fn sample(
+        &mut self,
+        (k, time): (u64, f64),
+        shared: Option<&Target<f64>>,
+        common: &Common,
+        shafts: &mut Shafts<V>,
+    ) {
+        let targets = self.targets(k, shared);
         let (counts, seen) = self.sensors.read(shafts.position);
         shafts.lost |= beyond(counts, targets.position);
         let (_, commanded) = self.servos.sample(shafts.lost, seen, &targets);

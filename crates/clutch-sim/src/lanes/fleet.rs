@@ -1,13 +1,13 @@
 //! Shafts of a fleet in lanes: motion, and laws where they can.
 
 use super::alike::Alike;
-use super::elementary::Powers;
 use super::motion::Motions;
 use super::servo::{FIXED, LaneServos, Sensors, Steered, Targets, beyond};
-use super::vector::{InLanes, at};
 use crate::engine::EngineKind;
 use crate::fleet::{Begun, Quantity, Told};
 use crate::lane::Lane;
+use crate::lane::elementary::Powers;
+use crate::lane::vector::{InLanes, at};
 use crate::metrics::Sticks;
 use crate::run::RunSpec;
 use crate::scenario::ScalarKind;

@@ -2,9 +2,9 @@
 
 use super::block::Block;
 use super::candidate::Candidate;
-use super::vector::at;
 use crate::engine::EngineKind;
 use crate::lane::MOST_LANES;
+use crate::lane::vector::at;
 use crate::metrics::{Detected, Metrics};
 use crate::run::RunSpec;
 use fearless_simd::Level;

@@ -18,10 +18,10 @@
 mod alike;
 mod block;
 mod candidate;
-mod elementary;
 pub(crate) mod fleet;
 mod group;
 mod in_steps;
+mod layer;
 mod motion;
 mod servo;
 mod shafts;
@@ -29,8 +29,5 @@ mod silence;
 mod steps;
 #[cfg(test)]
 pub(crate) mod tests;
-mod vector;
 
 pub(crate) use group::run_all;
-#[cfg(test)]
-pub(crate) use vector::levels;

@@ -233,6 +233,7 @@ pub(super) fn step_by_step<V: Lane>(
                 let step = Step {
                     to: [step.to[0].lane(i), step.to[1].lane(i)],
                     error: step.error.lane(i),
+                    grows: step.grows.lane(i),
                     rate: [step.rate[0].lane(i), step.rate[1].lane(i)],
                 };
                 let Some(own) = shafts.steps_mut() else { continue };
@@ -240,7 +241,10 @@ pub(super) fn step_by_step<V: Lane>(
                 let before = m.course;
                 match engine.judge(&mut m.course, &step, m.sign, (time, alike.period)) {
                     Ok(Outcome::On) if m.course.s < alike.period => {
-                        moving.swap(left, at);
+                        // Most stay where they are.
+                        if left < at {
+                            moving.swap(left, at);
+                        }
                         left += 1;
                     }
                     Ok(Outcome::On) => shafts.arrives(m, time),

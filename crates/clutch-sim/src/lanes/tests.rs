@@ -1,9 +1,9 @@
 //! Lanes against runs alone.
 
-use super::elementary::Powers;
 use super::run_all;
-use super::vector::{InLanes, at, levels};
 use crate::engine::exact_flow::{Flow, LINEAR_ABOVE, State};
+use crate::lane::elementary::Powers;
+use crate::lane::vector::{InLanes, at, levels};
 use crate::metrics::Detected;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
@@ -28,6 +28,7 @@ enum Function {
     Log1p,
     Sin,
     Cos,
+    Power(f64),
 }
 
 impl InLanes for Of<'_> {
@@ -44,6 +45,7 @@ impl InLanes for Of<'_> {
                 Function::Log1p => x.log1p(),
                 Function::Sin => x.sin(),
                 Function::Cos => x.sincos().1,
+                Function::Power(y) => x.powf(V::splat(y)),
             };
             (0..some.len()).map(|i| y.lane(i)).collect::<Vec<_>>()
         };
@@ -86,8 +88,9 @@ fn numbers(largest: f64, signs: &[f64]) -> Vec<f64> {
 
 #[test]
 fn elementary_functions_have_the_bits_of_libm_at_every_level() {
-    type Alone = fn(f64) -> f64;
-    let cases: [(Function, Alone, Vec<f64>); 8] = [
+    type Alone = Box<dyn Fn(f64) -> f64>;
+    type Plain = fn(f64) -> f64;
+    let cases: [(Function, Plain, Vec<f64>); 8] = [
         (Function::Exp, libm::exp, numbers(700.0, &[1.0, -1.0])),
         (Function::Expm1, libm::expm1, numbers(700.0, &[1.0, -1.0])),
         (Function::Log, libm::log, numbers(1e300, &[1.0])),
@@ -102,7 +105,15 @@ fn elementary_functions_have_the_bits_of_libm_at_every_level() {
         (Function::Sin, |x| libm::sincos(x).0, numbers(1e300, &[1.0, -1.0])),
         (Function::Cos, |x| libm::sincos(x).1, numbers(60.0, &[1.0, -1.0])),
     ];
-    for (function, alone, numbers) in cases {
+    let cases = cases.into_iter().map(|(f, alone, numbers)| (f, Box::new(alone) as Alone, numbers));
+    // Some that lanes have, and some that they leave to scalars.
+    let powers = [1.0 / 17.0, 1.0 / 18.0, -0.4999, 1e-9, 1.7, -3.3, 7.99, 0.5, 1.0, 2.0, -1.0, 0.0, 9.5];
+    let powers = powers.into_iter().map(|y: f64| {
+        let largest = if y.abs() < 0.5 { 1e300 } else { 1e25 };
+        let few = numbers(largest, &[1.0]).into_iter().step_by(5).chain([f64::MIN_POSITIVE, 1e-310]);
+        (Function::Power(y), Box::new(move |x| libm::pow(x, y)) as Alone, few.collect())
+    });
+    for (function, alone, numbers) in cases.chain(powers) {
         for level in levels() {
             let together = at(level, Of(function, &numbers)).unwrap();
             for (x, y) in numbers.iter().zip(together) {
@@ -125,9 +136,9 @@ impl InLanes for Slows {
 
     fn run<V: Powers>(self) -> Self::Output {
         let drive = V::splat(self.drive);
-        let flow =
-            Flow { drive, excess: drive, drag: V::ZERO, stribeck: V::ZERO, edge: V::splat(LINEAR_ABOVE) };
-        let piece = flow.first(&State::at(V::splat(self.speed)), V::splat(self.rest));
+        let (edge, unit) = (V::splat(LINEAR_ABOVE), V::ONE);
+        let flow = Flow { drive, excess: drive, unit, drag: V::ZERO, stribeck: V::ZERO, edge };
+        let (piece, ..) = flow.easy(&State::at(V::splat(self.speed)), V::splat(self.rest));
         (V::all(piece.done), V::all(piece.stops), piece.state.time.lane(V::WIDTH - 1))
     }
 }
@@ -136,7 +147,7 @@ impl InLanes for Slows {
 fn a_motion_that_stops_just_as_the_period_ends_stops_in_lanes_too() {
     // In exact numbers it would reach 0 an ulp after the end; rounded it is there at the end.
     let (drive, speed, rest) = (-8.497_374_274_981_322, 0.008_497_374_274_981_323, 1e-3);
-    let alone = Flow { drive, excess: drive, drag: 0.0, stribeck: 0.0, edge: LINEAR_ABOVE };
+    let alone = Flow { drive, excess: drive, unit: 1.0, drag: 0.0, stribeck: 0.0, edge: LINEAR_ABOVE };
     let (end, stops) = alone.run(State::at(speed), rest).unwrap();
     assert!(stops && end.time == rest, "alone: {stops}, at {} s", end.time);
     for level in levels() {

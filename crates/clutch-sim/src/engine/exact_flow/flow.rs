@@ -32,9 +32,11 @@ pub(crate) const PIECE_LIMIT: u32 = 10_000;
 pub(crate) struct Flow<V> {
     /// `A`, 1/s.
     pub(crate) drive: V,
-    /// `A − K`, 1/s: what is left of the torque at rest. The difference of the torques: near a break-away that of `A`
-    /// and `K` has lost its digits.
+    /// `(A − K) J v_s`, N m: what is left of the torque at rest. The difference of the torques: near a break-away that of
+    /// `A` and `K` has lost its digits.
     pub(crate) excess: V,
+    /// `J v_s`, kg m² rad/s. The slow alone divide by it.
+    pub(crate) unit: V,
     /// `G`, 1/s.
     pub(crate) drag: V,
     /// `K`, 1/s.
@@ -78,20 +80,21 @@ impl<V: Lane> Flow<V> {
         if !V::any(slow) {
             return fast;
         }
-        V::select(slow, self.excess - self.drag * speed - self.stribeck * (-speed).expm1(), fast)
+        let excess = self.excess / self.unit;
+        V::select(slow, excess - self.drag * speed - self.stribeck * (-speed).expm1(), fast)
     }
 
     /// The motion without `q`: to the end, or until it has fallen to a speed.
     #[inline(always)]
     fn linear(&self, at: &State<V>, rest: V, to: V) -> State<V> {
         let rate = self.drive - self.drag * at.speed;
-        // s − to = −rate (1 − e^{−Gt})/G
-        let fall = (at.speed - to) / -rate;
-        let share = self.drag * fall;
-        // The fall is never steeper than at first.
-        let falls = rate.less(V::ZERO) & fall.less(rest) & share.less(V::ONE);
         let (mut time, mut reaches) = (rest, V::none());
-        if V::any(falls) {
+        // The fall is never steeper than at first; most never come down so far.
+        if V::any((at.speed - to).less(V::splat(-1.01) * rate * rest)) {
+            // s − to = −rate (1 − e^{−Gt})/G
+            let fall = (at.speed - to) / -rate;
+            let share = self.drag * fall;
+            let falls = rate.less(V::ZERO) & fall.less(rest) & share.less(V::ONE);
             let undamped = self.drag.less_or_equal(V::ZERO);
             let damped = V::select(undamped, V::ZERO, -share);
             let reached = V::select(undamped, fall, -damped.log1p() / self.drag);
@@ -192,8 +195,12 @@ impl<V: Lane> Flow<V> {
         let long = s(0.5).less(way.abs());
         let rate = Rate { now, drag: self.drag, slip, long, some: (V::any(long), V::any(!long)) };
         let (mut time, mut moment, mut even, mut odd) = (V::ZERO, V::ZERO, V::ZERO, V::ZERO);
-        for [node, weight, sixth, seventh] in NODES {
-            let inverse = V::ONE / rate.at(s(node) * way);
+        let rates = rate.at_all(NODES.map(
+            #[inline(always)]
+            |[node, ..]| s(node) * way,
+        ));
+        for ([node, weight, sixth, seventh], rate) in NODES.into_iter().zip(rates) {
+            let inverse = V::ONE / rate;
             time = time + s(weight) * inverse;
             moment = moment + s(weight * node) * inverse;
             even = even + s(sixth) * inverse;
@@ -241,6 +248,7 @@ impl<V: Lane> Flow<V> {
         Flow {
             drive: self.drive.lane(i),
             excess: self.excess.lane(i),
+            unit: self.unit.lane(i),
             drag: self.drag.lane(i),
             stribeck: self.stribeck.lane(i),
             edge: self.edge.lane(i),
@@ -260,7 +268,7 @@ impl<V: Lane> Flow<V> {
     /// The next piece, if it is one outside of the layer, at its fringe, or in balance; most are. With it `q` and `φ`, where
     /// there is another.
     #[inline(always)]
-    fn easy(&self, at: &State<V>, rest: V) -> (Piece<V>, V, V) {
+    pub(crate) fn easy(&self, at: &State<V>, rest: V) -> (Piece<V>, V, V) {
         let (outside, stops, end) = self.outside(at, rest);
         let mut piece = Piece { done: outside, stops, state: State::select(outside, &end, at) };
         if V::all(outside) {
@@ -276,20 +284,10 @@ impl<V: Lane> Flow<V> {
         (piece, slip, rate)
     }
 
-    /// The piece from the begin of an interval, if it is an easy one.
+    /// The next piece that is none of these, by quadrature, if its estimate of its own error is small enough. In lanes there
+    /// is none where a guess would ask more of an exponential than lanes have; the mask is true where it would not.
     #[inline(always)]
-    pub(crate) fn first(&self, at: &State<V>, rest: V) -> Piece<V> {
-        self.easy(at, rest).0
-    }
-
-    /// The next piece, by the cheapest way whose estimate of its own error is small enough. In lanes there is none where a
-    /// guess would ask more of an exponential than lanes have.
-    #[inline(always)]
-    pub(crate) fn piece(&self, at: &State<V>, rest: V) -> Piece<V> {
-        let (mut piece, slip, rate) = self.easy(at, rest);
-        if V::all(piece.done) {
-            return piece;
-        }
+    pub(crate) fn inside(&self, at: &State<V>, (slip, rate): (V, V), rest: V) -> (Piece<V>, V::Mask) {
         let most = V::splat(V::EXPONENT);
         // The drag on a way of no more than twice REACH comes on top.
         let beyond = most.less(((rate + slip) * rest).abs()) | most.less(V::splat(20.0) * self.drag * rest);
@@ -297,16 +295,19 @@ impl<V: Lane> Flow<V> {
             #[inline(always)]
             || self.quadrature(at, rate, slip, rest),
         );
-        piece.takes(fits & !beyond, stops, &through);
-        if V::all(piece.done) {
-            return piece;
-        }
-        let (stops, along) = V::apart(
+        let done = fits & !beyond;
+        let state = State::select(done, &through, at);
+        (Piece { done, stops: stops & done, state }, !beyond)
+    }
+
+    /// The next piece as power series, as far as they go: for what is too steep for a quadrature.
+    #[inline(always)]
+    pub(crate) fn steep(&self, at: &State<V>, (slip, rate): (V, V), rest: V) -> Piece<V> {
+        let (stops, state) = V::apart(
             #[inline(always)]
             || series::step(at, rate, slip, self.drag, rest),
         );
-        piece.takes(!beyond, stops, &along);
-        piece
+        Piece { done: !V::none(), stops, state }
     }
 }
 
@@ -340,7 +341,14 @@ impl Flow<f64> {
             if rest <= 0.0 || !at.speed.is_finite() {
                 return Some((at, false));
             }
-            let piece = self.piece(&at, rest);
+            // The cheapest way whose estimate of its own error is small enough.
+            let (mut piece, slip, rate) = self.easy(&at, rest);
+            if !piece.done {
+                piece = self.inside(&at, (slip, rate), rest).0;
+            }
+            if !piece.done {
+                piece = self.steep(&at, (slip, rate), rest);
+            }
             at = piece.state;
             if piece.stops {
                 at.speed = 0.0;
@@ -374,14 +382,27 @@ struct Rate<V: Lane> {
 impl<V: Lane> Rate<V> {
     #[inline(always)]
     fn at(&self, way: V) -> V {
-        let mut fall = V::ZERO;
+        let [rate] = self.at_all([way]);
+        rate
+    }
+
+    /// At several ways.
+    #[inline(always)]
+    fn at_all<const N: usize>(&self, ways: [V; N]) -> [V; N] {
+        let mut falls = [V::ZERO; N];
         if self.some.1 {
-            fall = (-way).expm1();
+            falls = V::expm1_of_each(ways.map(|way| -way));
         }
         if self.some.0 {
-            fall = V::select(self.long, (-way).exp() - V::ONE, fall);
+            let powers = V::exp_of_each(ways.map(|way| -way));
+            for (fall, power) in falls.iter_mut().zip(powers) {
+                *fall = V::select(self.long, power - V::ONE, *fall);
+            }
         }
-        self.now - self.drag * way - self.slip * fall
+        for (fall, way) in falls.iter_mut().zip(ways) {
+            *fall = self.now - self.drag * way - self.slip * *fall;
+        }
+        falls
     }
 }
 

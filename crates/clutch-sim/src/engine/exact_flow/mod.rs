@@ -35,6 +35,8 @@ use clutch_core::friction::{Exponential, FrictionModel};
 /// Speed, in Stribeck velocities, above which `q` is lost in rounding if `K` times the time left is below 20; else the
 /// logarithm of that product comes on top.
 pub(crate) const LINEAR_ABOVE: f64 = 40.0;
+/// Speed, in Stribeck velocities, above which a motion in lanes goes on alone if the layer reaches as far.
+pub(crate) const HIGHEST_EDGE: f64 = 700.0;
 
 /// The fast engine.
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,6 +85,19 @@ pub(crate) struct Pushed<V> {
     pub(crate) holds: V,
 }
 
+impl Pushed<f64> {
+    /// Torque and friction under a voltage and a driving torque that stay as they are.
+    #[inline]
+    pub(crate) fn by(model: &Model, input: &Input<'_>) -> Self {
+        let volts = input.volts.at(0.0);
+        Pushed {
+            torque: input.torque(model, 0.0, 0.0),
+            normal: model.plant.actuator().normal(volts),
+            holds: model.break_away_torque(0.0, volts),
+        }
+    }
+}
+
 impl<V: Lane> Pushed<V> {
     /// Torque and friction of one lane.
     pub(crate) fn lane(&self, i: usize) -> Pushed<f64> {
@@ -126,23 +141,39 @@ impl<V: Lane> Bed<V> {
         self.curve.velocity
     }
 
-    /// The constants of the next `left` seconds, seen along a motion whose sign is `sign`.
+    /// The constants of the next `left` seconds, seen along a motion whose sign is `sign` and that begins at `speed`, in
+    /// Stribeck velocities.
     #[inline(always)]
-    pub(crate) fn flow(&self, pushed: &Pushed<V>, sign: V, left: V) -> Flow<V> {
+    pub(crate) fn flow(&self, pushed: &Pushed<V>, sign: V, speed: V, left: V) -> Flow<V> {
         let Pushed { torque, normal, holds } = *pushed;
         let Exponential { at_rest, sliding, .. } = self.curve;
         let stribeck = normal * (at_rest - sliding) / self.unit;
         // The number that was compared with.
         let first = V::select(self.drops, normal * at_rest, holds);
         let along = sign * torque;
-        let excess = (along - first) / self.unit;
+        let excess = along - first;
         // Without a layer both are one number, rounded once: the break-away that was seen has to happen.
         let even = V::same(stribeck, V::ZERO);
-        let drive = V::select(even, excess, (along - normal * sliding) / self.unit);
-        let (above, lost) = (V::splat(LINEAR_ABOVE), stribeck.abs() * left);
+        let drive = V::select(even, excess, along - normal * sliding) / self.unit;
+        let edge = self.edge(stribeck.abs() * left, (speed, drive), left);
+        Flow { drive, excess, unit: self.unit, drag: self.drag, stribeck, edge }
+    }
+
+    /// Speed above which `q` is lost in rounding; `K` times the time left is `lost`. A motion that stays above a higher one
+    /// has that instead, and spares the logarithm.
+    #[inline(always)]
+    fn edge(&self, lost: V, (speed, drive): (V, V), left: V) -> V {
+        let above = V::splat(LINEAR_ABOVE);
         let near = lost.less(V::splat(20.0));
-        let edge = if V::all(near) { above } else { V::select(near, above, above + lost.log()) };
-        Flow { drive, excess, drag: self.drag, stribeck, edge }
+        if V::all(near) {
+            return above;
+        }
+        // A tangent of the logarithm, a little above it: ln 20 = 2.9957.
+        let higher = above + V::splat(0.05) * lost + V::splat(2.0);
+        let slowest = speed - V::splat(1.01) * (drive.abs() + self.drag * speed) * left;
+        let stays = higher.less(slowest.min(V::splat(HIGHEST_EDGE)));
+        let edge = if V::all(near | stays) { higher } else { V::select(stays, higher, above + lost.log()) };
+        V::select(near, above, edge)
     }
 }
 
@@ -178,7 +209,10 @@ impl Bed<f64> {
             let run = match begun.take() {
                 Some((_, end, true)) => Some((State { speed: 0.0, ..end }, true)),
                 Some((flow, at, false)) => flow.run(at, left),
-                None => self.flow(pushed, sign, left).run(State::at(sign * shaft.velocity / v_s), left),
+                None => {
+                    let speed = sign * shaft.velocity / v_s;
+                    self.flow(pushed, sign, speed, left).run(State::at(speed), left)
+                }
             };
             let Some((end, stops)) = run else {
                 return Err(EngineError::TooManySteps { time, limit: PIECE_LIMIT });
@@ -219,12 +253,7 @@ impl Engine for ExactFlow {
         let Some(bed) = Bed::of(model) else {
             return Err(EngineError::Refused("friction that falls exponentially with the speed"));
         };
-        let volts = input.volts.at(0.0);
-        let pushed = Pushed {
-            torque: input.torque(model, 0.0, shaft.position),
-            normal: model.plant.actuator().normal(volts),
-            holds: model.break_away_torque(0.0, volts),
-        };
+        let pushed = Pushed::by(model, input);
         bed.advance(&pushed, (input.time, input.duration), shaft, events, None)
     }
 }

@@ -46,8 +46,9 @@ pub(super) fn step<V: Lane>(at: &State<V>, now: V, slip: V, drag: V, rest: V) ->
         let last = rate[n].abs();
         let over = allowed.less(last * power(step, n));
         if V::any(over) {
-            let share = allowed / last;
-            each(V::bits(over), |i| step.put(i, libm::pow(share.lane(i), INVERSE[n])));
+            // Others' shares may be no numbers.
+            let share = V::select(over, allowed / last, V::ONE);
+            step = V::select(over, share.powf(V::splat(INVERSE[n])), step);
         }
     }
     let time = |step: V| V::select(end.less_or_equal(step), rest, step / unit);

@@ -13,13 +13,17 @@ const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
 const REDUCED: f64 = f64::from_bits(0x3fd6_2e43_0000_0000);
 
 /// Access to the bits of a number, as exponentials and logarithms need it.
-pub(super) trait Powers: Lane {
+pub(crate) trait Powers: Lane {
     /// 2 to the power of a whole number from −1022 to 1023.
     fn power_of_two(self) -> Self;
     /// Whole part, towards 0.
     fn trunc(self) -> Self;
     /// The power of two at or below a magnitude; 0 of 0.
     fn binade(self) -> Self;
+    /// The upper half of its bits.
+    fn upper(self) -> Self;
+    /// A number from 1/2 to 2, and 1 more, to the digits of the upper half of its bits.
+    fn upper_sum(self) -> Self;
     /// Exponent and mantissa of a positive normal number, the mantissa between the square roots of 1/2 and of 2.
     fn split(self) -> (Self, Self);
 }
@@ -34,7 +38,7 @@ fn reduced<V: Powers>(x: V) -> (V, V, V) {
 }
 
 #[inline(always)]
-pub(super) fn exp<V: Powers>(x: V) -> V {
+pub(crate) fn exp<V: Powers>(x: V) -> V {
     const P: [f64; 5] = [
         1.666_666_666_666_660_2e-1,
         -2.777_777_777_701_559_3e-3,
@@ -54,7 +58,7 @@ pub(super) fn exp<V: Powers>(x: V) -> V {
 }
 
 #[inline(always)]
-pub(super) fn expm1<V: Powers>(x: V) -> V {
+pub(crate) fn expm1<V: Powers>(x: V) -> V {
     const Q: [f64; 5] = [
         -3.333_333_333_333_313e-2,
         1.587_301_587_254_814_6e-3,
@@ -120,7 +124,7 @@ fn series<V: Powers>(f: V) -> (V, V, V) {
 }
 
 #[inline(always)]
-pub(super) fn log<V: Powers>(x: V) -> V {
+pub(crate) fn log<V: Powers>(x: V) -> V {
     let (k, m) = x.split();
     let f = m - V::ONE;
     let (hfsq, s, r) = series(f);
@@ -128,7 +132,7 @@ pub(super) fn log<V: Powers>(x: V) -> V {
 }
 
 #[inline(always)]
-pub(super) fn log1p<V: Powers>(x: V) -> V {
+pub(crate) fn log1p<V: Powers>(x: V) -> V {
     let unreduced = V::splat(-f64::from_bits(0x3fd2_bec5_0000_0000)).less(x)
         & x.less(V::splat(f64::from_bits(0x3fda_827a_0000_0000)));
     let u = V::ONE + x;
@@ -142,8 +146,92 @@ pub(super) fn log1p<V: Powers>(x: V) -> V {
     V::select(x.abs().less(V::splat(f64::from_bits(0x3ca0_0000_0000_0000))), x, y)
 }
 
+/// True where [`pow`] is for these numbers: positive and normal, no power that a scalar takes another way, and a result far
+/// within range.
+#[inline(always)]
+pub(crate) fn has_pow<V: Powers>(x: V, y: V) -> V::Mask {
+    let (s, size) = (V::splat, y.abs());
+    let small = s(f64::MIN_POSITIVE).less_or_equal(x) & x.is_finite() & size.less(s(0.5));
+    let near = s(1e-30).less(x) & x.less(s(1e30)) & size.less(s(8.0));
+    let own = V::same(size, s(0.5)) | V::same(size, V::ONE) | V::same(size, s(2.0)) | size.less(s(1e-300));
+    (small | near) & !own
+}
+
+/// Where [`has_pow`] is true.
+#[inline(always)]
+pub(crate) fn pow<V: Powers>(x: V, y: V) -> V {
+    // log₂(3/2) in two parts, log₂ e likewise, and ln 2.
+    const DP: (f64, f64) = (5.849_624_872_207_642e-1, 1.350_039_202_129_749e-8);
+    const CP: (f64, f64, f64) =
+        (9.617_966_939_259_756e-1, 9.617_967_009_544_373e-1, -7.028_461_650_952_758e-9);
+    const LG2: (f64, f64, f64) =
+        (core::f64::consts::LN_2, 6.931_471_824_645_996e-1, -1.904_654_299_957_768e-9);
+    const L: [f64; 6] = [
+        5.999_999_999_999_946e-1,
+        4.285_714_285_785_502e-1,
+        3.333_333_298_183_774_3e-1,
+        2.727_281_238_085_34e-1,
+        2.306_607_457_755_617_5e-1,
+        2.069_750_178_003_384_2e-1,
+    ];
+    const P: [f64; 5] = [
+        1.666_666_666_666_660_2e-1,
+        -2.777_777_777_701_559_3e-3,
+        6.613_756_321_437_934e-5,
+        -1.653_390_220_546_525_2e-6,
+        4.138_136_797_057_238_5e-8,
+    ];
+    let (s, l, p) = (|x: f64| V::splat(x), |i: usize| V::splat(L[i]), |i: usize| V::splat(P[i]));
+    // x = 2ⁿ m, with m around 1 or around 3/2.
+    let (n, m) = x.split();
+    let low = m.less(V::ONE);
+    let (n, m) = (V::select(low, n - V::ONE, n), V::select(low, m + m, m));
+    let top = s(upper(0x3ffb_b67a)).less_or_equal(m);
+    let (n, m) = (V::select(top, n + V::ONE, n), V::select(top, s(0.5) * m, m));
+    let middle = s(upper(0x3ff3_988f)).less_or_equal(m);
+    let around = |x: f64, otherwise: f64| V::select(middle, s(x), s(otherwise));
+    let base = around(1.5, 1.0);
+    // log₂ of x in two parts.
+    let (u, v) = (m - base, V::ONE / (m + base));
+    let ss = u * v;
+    let s_h = ss.upper();
+    let t_h = m.upper_sum() + around(0.5, 0.0);
+    let t_l = m - (t_h - base);
+    let s_l = v * ((u - s_h * t_h) - s_h * t_l);
+    let s2 = ss * ss;
+    let r = s2 * s2 * (l(0) + s2 * (l(1) + s2 * (l(2) + s2 * (l(3) + s2 * (l(4) + s2 * l(5))))));
+    let r = r + s_l * (s_h + ss);
+    let s2 = s_h * s_h;
+    let t_h = (s(3.0) + s2 + r).upper();
+    let t_l = r - ((t_h - s(3.0)) - s2);
+    let (u, v) = (s_h * t_h, s_l * t_h + t_l * ss);
+    let p_h = (u + v).upper();
+    let p_l = v - (p_h - u);
+    let (z_h, z_l) = (s(CP.1) * p_h, s(CP.2) * p_h + p_l * s(CP.0) + around(DP.1, 0.0));
+    let t1 = (((z_h + z_l) + around(DP.0, 0.0)) + n).upper();
+    let t2 = z_l - (((t1 - n) - around(DP.0, 0.0)) - z_h);
+    // Times y.
+    let y1 = y.upper();
+    let p_l = (y - y1) * t1 + y * t2;
+    let p_h = y1 * t1;
+    let z = (p_l + p_h).upper();
+    let whole = (z.abs() + s(0.5)).trunc();
+    let whole = V::select(s(0.5).less(z.abs()), whole, V::ZERO);
+    let n = V::select(z.less(V::ZERO), -whole, whole);
+    // 2 to the power of that.
+    let p_h = p_h - n;
+    let t = (p_l + p_h).upper();
+    let (u, v) = (t * s(LG2.1), (p_l - (t - p_h)) * s(LG2.0) + t * s(LG2.2));
+    let z = u + v;
+    let w = v - (z - u);
+    let t = z * z;
+    let t1 = z - t * (p(0) + t * (p(1) + t * (p(2) + t * (p(3) + t * p(4)))));
+    let r = (z * t1) / (t1 - s(2.0)) - (w + z * w);
+    (V::ONE - (r - z)) * n.power_of_two()
+}
+
 /// Magnitude below which an argument is reduced by π/2 in three parts; beyond it takes more digits of π than these.
-pub(super) const REDUCIBLE: f64 = f64::from_bits(0x4139_21fb_0000_0000);
+pub(crate) const REDUCIBLE: f64 = f64::from_bits(0x4139_21fb_0000_0000);
 
 /// A number by the upper half of its bits.
 const fn upper(word: u64) -> f64 {
@@ -201,7 +289,7 @@ fn quarters<V: Powers>(x: V) -> (V, V, V) {
 
 /// For magnitudes below [`REDUCIBLE`].
 #[inline(always)]
-pub(super) fn sincos<V: Powers>(x: V) -> (V, V) {
+pub(crate) fn sincos<V: Powers>(x: V) -> (V, V) {
     const S: [f64; 6] = [
         -1.666_666_666_666_663_2e-1,
         8.333_333_333_322_49e-3,

@@ -22,7 +22,7 @@ trait Instructions: Simd + 'static {
 }
 
 /// Work that is done in lanes.
-pub(super) trait InLanes {
+pub(crate) trait InLanes {
     /// Its result.
     type Output;
     /// Does it.
@@ -41,7 +41,7 @@ macro_rules! instructions {
         )+
 
         /// Does some work by the instructions of a level; none where there are no lanes.
-        pub(super) fn at<W: InLanes>(level: Level, work: W) -> Option<W::Output> {
+        pub(crate) fn at<W: InLanes>(level: Level, work: W) -> Option<W::Output> {
             match level {
                 $(
                     $(#[$when])*
@@ -193,6 +193,12 @@ impl<S: Instructions> Arithmetic for Vector<S> {
     }
     #[inline(always)]
     fn powf(self, n: Self) -> Self {
+        if Self::all(elementary::has_pow(self, n)) {
+            return Self::apart(
+                #[inline(always)]
+                || elementary::pow(self, n),
+            );
+        }
         Self::of(|i| Arithmetic::powf(self.lane(i), n.lane(i)))
     }
     #[inline(always)]
@@ -312,6 +318,18 @@ impl<S: Instructions> Powers for Vector<S> {
     fn binade(self) -> Self {
         let exponent = S::u64s::splat(S::TOKEN, 0x7ff0_0000_0000_0000);
         Vector((self.0.bitcast::<S::u64s>() & exponent).bitcast())
+    }
+    #[inline(always)]
+    fn upper(self) -> Self {
+        let upper = S::u64s::splat(S::TOKEN, 0xffff_ffff_0000_0000);
+        Vector((self.0.bitcast::<S::u64s>() & upper).bitcast())
+    }
+    #[inline(always)]
+    fn upper_sum(self) -> Self {
+        // From one binade to the next a mantissa is worth twice as much: half of it, and the 1 that it lacked.
+        let word = |upper: u64| S::u64s::splat(S::TOKEN, upper << 32);
+        let half = (self.0.bitcast::<S::u64s>() >> 1) & word(0xffff_ffff);
+        Vector(((half | word(0x2000_0000)) + word(0x0008_0000)).bitcast())
     }
     #[inline(always)]
     fn split(self) -> (Self, Self) {

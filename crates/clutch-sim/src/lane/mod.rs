@@ -1,5 +1,9 @@
 //! Numbers of one run, or of several side by side.
 
+pub(crate) mod elementary;
+mod scalar;
+pub(crate) mod vector;
+
 use clutch_core::Arithmetic;
 
 /// Lanes of the widest vector.
@@ -51,6 +55,22 @@ pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     }
     /// Sine and cosine.
     fn sincos(self) -> (Self, Self);
+    /// e to the power of each.
+    #[inline(always)]
+    fn exp_of_each<const N: usize>(all: [Self; N]) -> [Self; N] {
+        all.map(
+            #[inline(always)]
+            |x| x.exp(),
+        )
+    }
+    /// e to the power of each, less 1.
+    #[inline(always)]
+    fn expm1_of_each<const N: usize>(all: [Self; N]) -> [Self; N] {
+        all.map(
+            #[inline(always)]
+            |x| x.expm1(),
+        )
+    }
 }
 
 /// Does something for each lane whose bit is set.
@@ -60,49 +80,4 @@ pub(crate) fn each(mut bits: u64, mut lane: impl FnMut(usize)) {
         lane(bits.trailing_zeros() as usize);
         bits &= bits - 1;
     }
-}
-
-/// The functions of a number that `libm` has by the same names.
-macro_rules! libm {
-    ($($f:ident)+) => { $(
-        #[inline]
-        fn $f(self) -> f64 {
-            libm::$f(self)
-        }
-    )+ };
-}
-
-impl Lane for f64 {
-    const WIDTH: usize = 1;
-    const EXPONENT: f64 = f64::INFINITY;
-
-    #[inline(always)]
-    fn apart<R>(work: impl FnOnce() -> R) -> R {
-        work()
-    }
-    #[inline]
-    fn of(mut each: impl FnMut(usize) -> f64) -> f64 {
-        each(0)
-    }
-    #[inline]
-    fn lane(&self, _: usize) -> f64 {
-        *self
-    }
-    #[inline]
-    fn put(&mut self, _: usize, x: f64) {
-        *self = x;
-    }
-    #[inline]
-    fn any(mask: bool) -> bool {
-        mask
-    }
-    #[inline]
-    fn bits(mask: bool) -> u64 {
-        mask.into()
-    }
-    #[inline]
-    fn sincos(self) -> (f64, f64) {
-        libm::sincos(self)
-    }
-    libm! { floor exp expm1 log log1p sin }
 }
