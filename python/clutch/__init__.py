@@ -12,29 +12,28 @@ True
 """
 
 import importlib
-from types import ModuleType
-from typing import TYPE_CHECKING
 
-from clutch import _clutch, _tables
-from clutch._certificate import Certificate
-from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
-from clutch._compare import Comparison, compare
-from clutch._errors import LoopError, ParamError
-from clutch._log import Difference, Log, Replay, read_log, replay
-from clutch._loop import LoopResult, loop
-from clutch._metrics import Metrics
-from clutch._model import Scenario
-from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Result, SteppedLaw, simulate
-from clutch._smooth import SmoothSpeed, lowest_smooth_speed
-from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
-from clutch._tables import *  # noqa: F403
-from clutch._tune import Candidate, Estimate, Identified, Tuned, identify, tune
+from clutch._names import TABLES
 
+# As typing has it, without importing typing.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from clutch import dynamics, executors, gym, plot, referee
-
-__version__ = _clutch.VERSION
+    from clutch._certificate import Certificate
+    from clutch._clutch import VERSION as __version__
+    from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
+    from clutch._compare import Comparison, compare
+    from clutch._errors import LoopError, ParamError
+    from clutch._log import Difference, Log, Replay, read_log, replay
+    from clutch._loop import LoopResult, loop
+    from clutch._metrics import Metrics
+    from clutch._model import Scenario
+    from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
+    from clutch._run import Result, SteppedLaw, simulate
+    from clutch._smooth import SmoothSpeed, lowest_smooth_speed
+    from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+    from clutch._tables import *  # noqa: F403
+    from clutch._tune import Candidate, Estimate, Identified, Tuned, identify, tune
 
 __all__ = [
     "Candidate",
@@ -88,16 +87,39 @@ __all__ = [
     "sweep",
     "tune",
 ]
-__all__ += _tables.__all__
+__all__ += TABLES
 
-# Each imports a large library, so it is imported on request.
-_LATER = {"dynamics", "executors", "gym", "plot", "referee"}
+# Each name is imported when it is first asked for: a program that simulates does not wait for what sweeps or plots.
+_MODULES = {
+    "_certificate": ["Certificate"],
+    "_clutch": ["Path", "Plant", "Servo", "StickSlip", "Table", "Target", "Tick", "scenarios"],
+    "_compare": ["Comparison", "compare"],
+    "_errors": ["LoopError", "ParamError"],
+    "_log": ["Difference", "Log", "Replay", "read_log", "replay"],
+    "_loop": ["LoopResult", "loop"],
+    "_metrics": ["Metrics"],
+    "_model": ["Scenario"],
+    "_paper": ["PaperFigure", "PaperPanel", "Reproduction", "reproduce"],
+    "_run": ["Result", "SteppedLaw", "simulate"],
+    "_smooth": ["SmoothSpeed", "lowest_smooth_speed"],
+    "_sweep": ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"],
+    "_tables": TABLES,
+    "_tune": ["Candidate", "Estimate", "Identified", "Tuned", "identify", "tune"],
+}
+_WHERE = {name: (module, name) for module, names in _MODULES.items() for name in names}
+_WHERE["__version__"] = ("_clutch", "VERSION")
+_SUBMODULES = {"dynamics", "executors", "gym", "plot", "referee"}
 
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> ModuleType:
-    if name in _LATER:
-        return importlib.import_module(f"clutch.{name}")
-    raise AttributeError(f"module 'clutch' has no attribute {name!r}")
+    def __getattr__(name):
+        if name in _SUBMODULES:
+            return importlib.import_module(f"clutch.{name}")
+        if name not in _WHERE:
+            raise AttributeError(f"module 'clutch' has no attribute {name!r}")
+        module, there = _WHERE[name]
+        value = globals()[name] = getattr(importlib.import_module(f"clutch.{module}"), there)
+        return value
 
 
 def __dir__() -> list[str]:
