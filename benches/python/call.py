@@ -29,7 +29,7 @@ def build_floor() -> ModuleType:
 
 
 def candidates(rounds: int) -> list[Candidate]:
-    """Ours, the floor, and the loop around both, which is subtracted."""
+    """Ours, the floors, and the loop around them, which is subtracted."""
     floor = build_floor()
     per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
     ticks = range(CALLS)
@@ -40,15 +40,17 @@ def candidates(rounds: int) -> list[Candidate]:
     ours = clutch.Servo(clutch.Scenario.from_toml(toml("J2")))
     our_targets = [clutch.Target(p, RATES["J2"], 0.0) for p in positions]
     ours.start(0, our_targets[0], 0.0)
-    least = floor.Law(KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
+    numbers = (KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
+    law, servo = floor.Law(*numbers), floor.Servo(*numbers)
     floor_targets = [floor.Target(p, RATES["J2"], 0.0) for p in positions]
 
-    # Before anything is timed: both are the same law. Ours takes targets in whole 2^-16 counts, up to 24 µV
+    # Before anything is timed: all are the same law. Ours and the servo take targets in whole 2^-16 counts, up to 24 µV
     # of the proportional term and 120 µV of the derivative's.
     ours_volts = [ours.step(c, t) for c, t in zip(counts, our_targets, strict=True)]
-    floor_volts = [least.step(c, t) for c, t in zip(counts, floor_targets, strict=True)]
-    worst = max(abs(a - b) for a, b in zip(ours_volts, floor_volts, strict=True))
-    assert worst < 1e-3, f"ours and the floor differ by {worst} V"
+    for least in (law, servo):
+        floor_volts = [least.step(c, t) for c, t in zip(counts, floor_targets, strict=True)]
+        worst = max(abs(a - b) for a, b in zip(ours_volts, floor_volts, strict=True))
+        assert worst < 1e-3, f"ours and the {type(least).__name__} in C differ by {worst} V"
     assert max(ours_volts) - min(ours_volts) > 1.0, "the law is at its limits all the time"
 
     def loop_ours():
@@ -56,14 +58,22 @@ def candidates(rounds: int) -> list[Candidate]:
         for c, t in zip(counts, our_targets, strict=True):
             step(c, t)
 
-    def loop_floor():
-        step = least.step
-        for c, t in zip(counts, floor_targets, strict=True):
-            step(c, t)
+    def loop_of(least):
+        def loop():
+            step = least.step
+            for c, t in zip(counts, floor_targets, strict=True):
+                step(c, t)
+
+        return loop
 
     def loop_empty():
         for _c, _t in zip(counts, our_targets, strict=True):
             pass
 
-    works = {"clutch.Servo.step": loop_ours, "C-API floor": loop_floor, "empty loop": loop_empty}
+    works = {
+        "clutch.Servo.step": loop_ours,
+        "C-API floor, the law": loop_of(law),
+        "C-API floor, the servo": loop_of(servo),
+        "empty loop": loop_empty,
+    }
     return [Candidate(name, work, rounds) for name, work in works.items()]

@@ -1,7 +1,9 @@
 /* The floor of a law's step called from Python: the least cost of CPython's own C API for the same arguments.
  *
- * A C type with a METH_FASTCALL method: a whole number of counts and a target in, PD (4) with (5) and its limits,
- * a float out. No checks beyond those without which it would crash. */
+ * C types with a METH_FASTCALL method: a whole number of counts and a target in, a float out. `Law` is PD (4) with (5)
+ * and its limits alone. `Servo` does all that a servo has to: positions of 64 bits in 2^-16 counts across the wrap of
+ * the counter, the offset of a bumpless start, a voltage for what is no number, the converter's code, and what is asked
+ * of it afterwards. No checks beyond those without which it would crash. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -84,12 +86,101 @@ static PyTypeObject LawType = {
     .tp_methods = Law_methods,
 };
 
+typedef struct {
+    PyObject_HEAD
+    double kp, kd, keep, scale, radians_per_count, lowest, highest, decay;
+    double dac_lowest, dac_step, per_volt, top;
+    int32_t counts;
+    int64_t position, error;
+    double rate, offset, applied;
+    /* Of the last step. */
+    double tick_error, tick_rate, demand, terms[2];
+    int limit;
+    uint16_t code;
+} Servo;
+
+static int Servo_init(Servo *self, PyObject *args, PyObject *kwargs)
+{
+    static char *names[] = {"kp", "kd", "smoothing", "period", "radians_per_count", "lowest", "highest", NULL};
+    double smoothing, period;
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "ddddddd", names, &self->kp, &self->kd, &smoothing, &period,
+                                     &self->radians_per_count, &self->lowest, &self->highest))
+        return -1;
+    self->keep = 1.0 - smoothing;
+    self->scale = smoothing * self->radians_per_count / period;
+    self->dac_lowest = -10.0;
+    self->dac_step = 20.0 / 4096.0;
+    self->per_volt = 4096.0 / 20.0;
+    self->top = 4095.0;
+    self->counts = 0;
+    self->position = self->error = 0;
+    self->rate = self->offset = self->decay = self->applied = 0.0;
+    return 0;
+}
+
+static PyObject *Servo_step(Servo *self, PyObject *const *args, Py_ssize_t n)
+{
+    if (n != 2 || !Py_IS_TYPE(args[1], &TargetType)) {
+        PyErr_SetString(PyExc_TypeError, "step(counts, target)");
+        return NULL;
+    }
+    long counts = PyLong_AsLong(args[0]);
+    if (counts == -1 && PyErr_Occurred())
+        return NULL;
+    const Target *target = (const Target *)args[1];
+    int32_t moved = (int32_t)((uint32_t)counts - (uint32_t)self->counts);
+    self->counts = (int32_t)counts;
+    self->position += (int64_t)moved * 65536;
+    int64_t error = (int64_t)(target->position_counts * 65536.0) - self->position;
+    self->rate = self->keep * self->rate + self->scale * ((double)(error - self->error) * (1.0 / 65536.0));
+    self->error = error;
+    self->tick_error = (double)error * (1.0 / 65536.0) * self->radians_per_count;
+    self->tick_rate = self->rate;
+    self->terms[0] = -(self->kp * self->tick_error);
+    self->terms[1] = -(self->kd * self->tick_rate);
+    double volts = self->terms[0] + self->terms[1] + self->offset;
+    self->offset *= self->decay;
+    self->limit = 0;
+    if (volts < self->lowest) {
+        volts = self->lowest;
+        self->limit = 1;
+    } else if (volts > self->highest) {
+        volts = self->highest;
+        self->limit = 2;
+    } else if (volts != volts) {
+        volts = self->highest;
+        self->limit = 3;
+    }
+    self->demand = volts;
+    double code = (volts - self->dac_lowest) * self->per_volt + 0.5;
+    code = code < 0.0 ? 0.0 : code > self->top ? self->top : code;
+    self->code = (uint16_t)code;
+    self->applied = self->dac_lowest + self->dac_step * self->code;
+    return PyFloat_FromDouble(self->demand);
+}
+
+static PyMethodDef Servo_methods[] = {
+    {"step", (PyCFunction)(void (*)(void))Servo_step, METH_FASTCALL, NULL},
+    {NULL},
+};
+
+static PyTypeObject ServoType = {
+    PyVarObject_HEAD_INIT(NULL, 0)
+    .tp_name = "floor.Servo",
+    .tp_basicsize = sizeof(Servo),
+    .tp_flags = Py_TPFLAGS_DEFAULT,
+    .tp_new = PyType_GenericNew,
+    .tp_init = (initproc)Servo_init,
+    .tp_methods = Servo_methods,
+};
+
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "floor", .m_size = -1};
 
 PyMODINIT_FUNC PyInit_floor(void)
 {
     PyObject *m = PyModule_Create(&module);
-    if (!m || PyModule_AddType(m, &TargetType) < 0 || PyModule_AddType(m, &LawType) < 0)
+    if (!m || PyModule_AddType(m, &TargetType) < 0 || PyModule_AddType(m, &LawType) < 0
+        || PyModule_AddType(m, &ServoType) < 0)
         return NULL;
     return m;
 }
