@@ -11,7 +11,6 @@ use crate::lane::{Lane, each};
 #[derive(Clone, Copy)]
 pub(super) struct Period<V: Lane> {
     pub(super) pushed: Pushed<V>,
-    pub(super) flow: Flow<V>,
     pub(super) sign: V,
     /// Velocity of a speed of 1, rad/s.
     pub(super) way: V,
@@ -20,7 +19,6 @@ pub(super) struct Period<V: Lane> {
 }
 
 /// Motions on their way through a period, column by column.
-#[derive(Default)]
 struct Queue {
     many: usize,
     /// Their vectors' places and their lanes.
@@ -46,26 +44,26 @@ impl Queue {
 
     /// Some of them, from this one on, in the lanes of a vector; in lanes that are left over the last.
     #[inline(always)]
-    fn gather<V: Lane>(&self, first: usize, periods: &[Period<V>]) -> (Flow<V>, State<V>, V) {
+    fn gather<V: Lane>(&self, first: usize, flows: &[Flow<f64>]) -> (Flow<V>, State<V>, V) {
         let last = self.many - 1;
         let [time, speed, rate, way, slip] = &self.columns;
         let column = |column: &[f64]| match column.get(first..first + V::WIDTH) {
             Some(all) if first + V::WIDTH <= self.many => V::of(|i| all[i]),
             _ => V::of(|i| column[(first + i).min(last)]),
         };
-        let flow = |get: fn(&Flow<V>) -> &V| {
+        let flow = |get: fn(&Flow<f64>) -> f64| {
             V::of(|i| {
                 let (shafts, lane) = self.places[(first + i).min(last)];
-                get(&periods[shafts].flow).lane(lane)
+                get(&flows[shafts * V::WIDTH + lane])
             })
         };
         let flow = Flow {
-            drive: flow(|f| &f.drive),
-            excess: flow(|f| &f.excess),
-            unit: flow(|f| &f.unit),
-            drag: flow(|f| &f.drag),
-            stribeck: flow(|f| &f.stribeck),
-            edge: flow(|f| &f.edge),
+            drive: flow(|f| f.drive),
+            excess: flow(|f| f.excess),
+            unit: flow(|f| f.unit),
+            drag: flow(|f| f.drag),
+            stribeck: flow(|f| f.stribeck),
+            edge: flow(|f| f.edge),
         };
         let at = State { time: column(time), speed: column(speed), rate: column(rate), way: column(way) };
         (flow, at, column(slip))
@@ -76,9 +74,11 @@ impl Queue {
 pub(super) struct Layer<V: Lane> {
     /// Vector by vector.
     periods: Vec<Period<V>>,
-    /// A piece outside of the layer, at its fringe or in balance, or none of these.
+    /// Lane by lane of each vector: a motion reads all of one.
+    flows: Vec<Flow<f64>>,
+    /// Perhaps an easy one.
     easy: Queue,
-    /// Those that are none of these, on.
+    /// As `easy`, in the next round.
     next: Queue,
     /// A quadrature, if its error is small enough.
     inside: Queue,
@@ -90,12 +90,13 @@ impl<V: Lane> Layer<V> {
     /// Room for the motions of so many vectors.
     pub(super) fn of(vectors: usize) -> Self {
         let zero = V::ZERO;
-        let flow = Flow { drive: zero, excess: zero, unit: zero, drag: zero, stribeck: zero, edge: zero };
+        let flow = Flow { drive: 0.0, excess: 0.0, unit: 0.0, drag: 0.0, stribeck: 0.0, edge: 0.0 };
         let pushed = Pushed { torque: zero, normal: zero, holds: zero };
-        let period = Period { pushed, flow, sign: zero, way: zero, breaks_away: 0 };
+        let period = Period { pushed, sign: zero, way: zero, breaks_away: 0 };
         let queue = || Queue::of(vectors * V::WIDTH);
         Layer {
             periods: vec![period; vectors],
+            flows: vec![flow; vectors * V::WIDTH],
             easy: queue(),
             next: queue(),
             inside: queue(),
@@ -114,11 +115,12 @@ impl<V: Lane> Layer<V> {
     pub(super) fn wait(
         &mut self,
         n: usize,
-        period: Period<V>,
+        (period, flow): (Period<V>, &Flow<V>),
         (some, inside): (u64, u64),
         (state, slip, rate): (&State<V>, V, V),
     ) {
         self.periods[n] = period;
+        each(some, |lane| self.flows[n * V::WIDTH + lane] = flow.lane(lane));
         let known = State { rate, ..*state };
         each(some & inside, |lane| self.inside.put((n, lane), &known.lane(lane), slip.lane(lane)));
         each(some & !inside, |lane| self.easy.put((n, lane), &state.lane(lane), 0.0));
@@ -128,27 +130,27 @@ impl<V: Lane> Layer<V> {
     #[inline(always)]
     pub(super) fn end(&mut self, all: &mut [Shafts<V>], time: f64, alike: &Alike, events: &mut Vec<Event>) {
         let whole = V::splat(alike.period);
-        let Layer { periods, easy, next, inside, steep } = self;
-        let mut after = After { all, time, alike, events };
+        let Layer { periods, flows, easy, next, inside, steep } = self;
+        let mut after = After { all, flows, time, alike, events };
         for _ in 0..PIECE_LIMIT {
             if easy.many + inside.many == 0 {
                 return;
             }
             for first in (0..easy.many).step_by(V::WIDTH) {
-                let (flow, at, _) = easy.gather(first, periods);
+                let (flow, at, _) = easy.gather(first, after.flows);
                 let (piece, slip, rate) = flow.easy(&at, whole - at.time);
                 let known = State { rate, ..at };
                 let on = |i: usize| (known.lane(i), slip.lane(i));
                 after.take(&piece, (whole, V::none()), (easy, first), periods, next, (inside, on));
             }
             for first in (0..inside.many).step_by(V::WIDTH) {
-                let (flow, at, slip) = inside.gather(first, periods);
+                let (flow, at, slip) = inside.gather(first, after.flows);
                 let (piece, room) = flow.inside(&at, (slip, at.rate), whole - at.time);
                 let on = |i: usize| (at.lane(i), slip.lane(i));
                 after.take(&piece, (whole, !room), (inside, first), periods, next, (steep, on));
             }
             for first in (0..steep.many).step_by(V::WIDTH) {
-                let (flow, at, slip) = steep.gather(first, periods);
+                let (flow, at, slip) = steep.gather(first, after.flows);
                 let piece = flow.steep(&at, (slip, at.rate), whole - at.time);
                 let on = |i: usize| (at.lane(i), slip.lane(i));
                 after.take(&piece, (whole, V::none()), (steep, first), periods, next, (inside, on));
@@ -167,14 +169,15 @@ impl<V: Lane> Layer<V> {
 /// What motions that end need.
 struct After<'a, V: Lane> {
     all: &'a mut [Shafts<V>],
+    flows: &'a [Flow<f64>],
     time: f64,
     alike: &'a Alike,
     events: &'a mut Vec<Event>,
 }
 
 impl<V: Lane> After<'_, V> {
-    /// Motions of a queue, from `first` on, have a piece each, and end, or need a `next`; those without one are put `on` into
-    /// another queue, but for those that are `alone`.
+    /// Motions of a queue, from `first` on, have made a piece: they end, or wait for the next round. Those that have not are put into another
+    /// queue, with the state and `q` that `on` gives, but for those that have to go alone.
     #[inline(always)]
     fn take(
         &mut self,
@@ -203,7 +206,9 @@ impl<V: Lane> After<'_, V> {
                 other.put(*place, &state, slip);
             } else {
                 let state = if is(V::bits(finite)) { state.lane(i) } else { on(i).0 };
-                shafts.alone(place.1, period, (&state, is(stops)), (self.time, self.alike), self.events);
+                let flow = self.flows[place.0 * V::WIDTH + place.1];
+                let begun = (flow, state, is(stops));
+                shafts.alone(place.1, period, begun, (self.time, self.alike), self.events);
             }
         }
     }
@@ -231,7 +236,7 @@ impl<V: Lane> Shafts<V> {
         &mut self,
         lane: usize,
         period: &Period<V>,
-        (state, stops): (&State<f64>, bool),
+        begun: (Flow<f64>, State<f64>, bool),
         (time, alike): (f64, &Alike),
         events: &mut Vec<Event>,
     ) {
@@ -241,9 +246,8 @@ impl<V: Lane> Shafts<V> {
         events.clear();
         let moved = match &self.moves {
             Moves::Exactly { alone, .. } => {
-                let begun = Some((period.flow.lane(lane), *state, stops));
                 let pushed = period.pushed.lane(lane);
-                alone[lane].advance(&pushed, (time, alike.period), &mut shaft, events, begun).is_ok()
+                alone[lane].advance(&pushed, (time, alike.period), &mut shaft, events, Some(begun)).is_ok()
             }
             Moves::InSteps(_) => false,
         };

@@ -120,8 +120,8 @@ impl<V: Lane> Shafts<V> {
         let left = !stuck & !done;
         if V::any(left) {
             let left = (V::bits(left) & !self.lost, V::bits(!easy));
-            let period = Period { pushed, flow, sign, way, breaks_away: V::bits(breaks_away) };
-            layer.wait(n, period, left, (&state, slip, rate));
+            let period = Period { pushed, sign, way, breaks_away: V::bits(breaks_away) };
+            layer.wait(n, (period, &flow), left, (&state, slip, rate));
         }
     }
 }
