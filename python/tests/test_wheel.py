@@ -1,6 +1,8 @@
 """The package is the Rust code: the same bits as the command, whatever way they are asked for."""
 
+import ast
 import copy
+import importlib
 import inspect
 import json
 import pickle
@@ -506,6 +508,34 @@ def test_importing_the_package_imports_no_other_library():
     heavy = ("numpy", "pandas", "matplotlib", "scipy", "tqdm", "pyarrow", "polars", "xarray", "gymnasium", "control")
     done = subprocess.run([sys.executable, "-c", code % (heavy,)], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_importing_the_package_imports_names_alone():
+    code = "import sys; before = set(sys.modules); import clutch; print(sorted(set(sys.modules) - before))"
+    done = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True)
+    new = [name for name in ast.literal_eval(done.stdout) if name.split(".")[0] == "clutch"]
+    assert new == ["clutch", "clutch._names"]
+
+
+def test_each_name_is_what_the_import_for_type_checkers_says():
+    source = Path(package.__file__).read_text("utf-8")
+    guarded = next(node for node in ast.parse(source).body if isinstance(node, ast.If))
+    said = set()
+    for line in guarded.body:
+        assert isinstance(line, ast.ImportFrom)
+        module = importlib.import_module(line.module)
+        for name in line.names:
+            if name.name == "*":
+                said |= set(module.__all__)
+                assert all(getattr(package, each) is getattr(module, each) for each in module.__all__)
+            elif line.module == "clutch":
+                said.add(name.name)  # a module that brings a library along
+            else:
+                said.add(name.asname or name.name)
+                assert getattr(package, name.asname or name.name) is getattr(module, name.name)
+    assert said == set(package.__all__) == set(dir(package))
+    with pytest.raises(AttributeError, match="module 'clutch' has no attribute 'simulator'"):
+        package.simulator  # noqa: B018
 
 
 def test_version_types_and_build_are_those_of_the_crates(clutch):
