@@ -13,83 +13,64 @@ True
 
 import importlib
 
-from clutch._names import TABLES
-
 # As typing has it, without importing typing.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from clutch import dynamics, executors, gym, plot, referee
-    from clutch._certificate import Certificate
-    from clutch._clutch import VERSION as __version__
-    from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
-    from clutch._compare import Comparison, compare
-    from clutch._errors import LoopError, ParamError
-    from clutch._log import Difference, Log, Replay, read_log, replay
-    from clutch._loop import LoopResult, loop
-    from clutch._metrics import Metrics
-    from clutch._model import Scenario
-    from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-    from clutch._run import Result, SteppedLaw, simulate
-    from clutch._smooth import SmoothSpeed, lowest_smooth_speed
-    from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+    from clutch import dynamics as dynamics
+    from clutch import executors as executors
+    from clutch import gym as gym
+    from clutch import plot as plot
+    from clutch import referee as referee
+    from clutch._certificate import Certificate as Certificate
+    from clutch._clutch import Path as Path
+    from clutch._clutch import Plant as Plant
+    from clutch._clutch import Servo as Servo
+    from clutch._clutch import StickSlip as StickSlip
+    from clutch._clutch import Table as Table
+    from clutch._clutch import Target as Target
+    from clutch._clutch import Tick as Tick
+    from clutch._clutch import scenarios as scenarios
+    from clutch._compare import Comparison as Comparison
+    from clutch._compare import compare as compare
+    from clutch._errors import LoopError as LoopError
+    from clutch._errors import ParamError as ParamError
+    from clutch._log import Difference as Difference
+    from clutch._log import Log as Log
+    from clutch._log import Replay as Replay
+    from clutch._log import read_log as read_log
+    from clutch._log import replay as replay
+    from clutch._loop import LoopResult as LoopResult
+    from clutch._loop import loop as loop
+    from clutch._metrics import Metrics as Metrics
+    from clutch._model import Scenario as Scenario
+    from clutch._paper import PaperFigure as PaperFigure
+    from clutch._paper import PaperPanel as PaperPanel
+    from clutch._paper import Reproduction as Reproduction
+    from clutch._paper import reproduce as reproduce
+    from clutch._run import Result as Result
+    from clutch._run import SteppedLaw as SteppedLaw
+    from clutch._run import simulate as simulate
+    from clutch._smooth import SmoothSpeed as SmoothSpeed
+    from clutch._smooth import lowest_smooth_speed as lowest_smooth_speed
+    from clutch._sweep import Samples as Samples
+    from clutch._sweep import SweepResult as SweepResult
+    from clutch._sweep import grid as grid
+    from clutch._sweep import latin_hypercube as latin_hypercube
+    from clutch._sweep import samples as samples
+    from clutch._sweep import sobol as sobol
+    from clutch._sweep import sweep as sweep
     from clutch._tables import *  # noqa: F403
-    from clutch._tune import Candidate, Estimate, Identified, Tuned, identify, tune
+    from clutch._tune import Candidate as Candidate
+    from clutch._tune import Estimate as Estimate
+    from clutch._tune import Identified as Identified
+    from clutch._tune import Tuned as Tuned
+    from clutch._tune import identify as identify
+    from clutch._tune import tune as tune
 
-__all__ = [
-    "Candidate",
-    "Certificate",
-    "Comparison",
-    "Difference",
-    "Estimate",
-    "Identified",
-    "Log",
-    "LoopError",
-    "LoopResult",
-    "Metrics",
-    "PaperFigure",
-    "PaperPanel",
-    "ParamError",
-    "Path",
-    "Plant",
-    "Replay",
-    "Reproduction",
-    "Result",
-    "Samples",
-    "Scenario",
-    "Servo",
-    "SmoothSpeed",
-    "SteppedLaw",
-    "StickSlip",
-    "SweepResult",
-    "Table",
-    "Target",
-    "Tick",
-    "Tuned",
-    "__version__",
-    "compare",
-    "dynamics",
-    "executors",
-    "grid",
-    "gym",
-    "identify",
-    "latin_hypercube",
-    "loop",
-    "lowest_smooth_speed",
-    "plot",
-    "read_log",
-    "referee",
-    "replay",
-    "reproduce",
-    "samples",
-    "scenarios",
-    "simulate",
-    "sobol",
-    "sweep",
-    "tune",
-]
-__all__ += TABLES
+    __version__: str
 
-# Each name is imported when it is first asked for: a program that simulates does not wait for what sweeps or plots.
+# Each name is imported when it is first asked for: a program that simulates does not wait for what sweeps or plots. All
+# other names are of a scenario's tables, which have a list of them.
 _MODULES = {
     "_certificate": ["Certificate"],
     "_clutch": ["Path", "Plant", "Servo", "StickSlip", "Table", "Target", "Tick", "scenarios"],
@@ -103,7 +84,6 @@ _MODULES = {
     "_run": ["Result", "SteppedLaw", "simulate"],
     "_smooth": ["SmoothSpeed", "lowest_smooth_speed"],
     "_sweep": ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"],
-    "_tables": TABLES,
     "_tune": ["Candidate", "Estimate", "Identified", "Tuned", "identify", "tune"],
 }
 _WHERE = {name: (module, name) for module, names in _MODULES.items() for name in names}
@@ -112,15 +92,23 @@ _SUBMODULES = {"dynamics", "executors", "gym", "plot", "referee"}
 
 if not TYPE_CHECKING:
 
+    def _of_tables():
+        return importlib.import_module("clutch._tables")
+
     def __getattr__(name):
         if name in _SUBMODULES:
             return importlib.import_module(f"clutch.{name}")
-        if name not in _WHERE:
+        if name == "__all__":
+            value = sorted([*_WHERE, *_SUBMODULES, *_of_tables().__all__])
+        elif name in _WHERE:
+            module, there = _WHERE[name]
+            value = getattr(importlib.import_module(f"clutch.{module}"), there)
+        elif not name.startswith("_") and name in _of_tables().__all__:
+            value = getattr(_of_tables(), name)
+        else:
             raise AttributeError(f"module 'clutch' has no attribute {name!r}")
-        module, there = _WHERE[name]
-        value = globals()[name] = getattr(importlib.import_module(f"clutch.{module}"), there)
+        globals()[name] = value
         return value
 
-
-def __dir__() -> list[str]:
-    return __all__
+    def __dir__():
+        return __getattr__("__all__")

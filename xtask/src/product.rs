@@ -28,7 +28,6 @@ const TESTS: &[&str] = &[
 pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_clutch.pyi", "cargo xtask stubs"),
     ("python/clutch/_metrics.py", "cargo xtask generate"),
-    ("python/clutch/_names.py", "cargo xtask generate"),
     ("python/clutch/_tables.py", "cargo xtask generate"),
     ("docs/scenario.schema.json", "cargo xtask generate"),
     ("crates/clutch-wire/include/clutch_wire.h", "cargo xtask generate"),

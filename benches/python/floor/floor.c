@@ -38,6 +38,17 @@ static PyTypeObject TargetType = {
     .tp_members = Target_members,
 };
 
+/* The arguments of a step; NULL, with an exception, if they are others. */
+static inline const Target *arguments(PyObject *const *args, Py_ssize_t n, long *counts)
+{
+    if (n != 2 || !Py_IS_TYPE(args[1], &TargetType)) {
+        PyErr_SetString(PyExc_TypeError, "step(counts, target)");
+        return NULL;
+    }
+    *counts = PyLong_AsLong(args[0]);
+    return *counts == -1 && PyErr_Occurred() ? NULL : (const Target *)args[1];
+}
+
 typedef struct {
     PyObject_HEAD
     double kp, kd, smoothing, period, radians_per_count, lowest, highest;
@@ -55,14 +66,10 @@ static int Law_init(Law *self, PyObject *args, PyObject *kwargs)
 
 static PyObject *Law_step(Law *self, PyObject *const *args, Py_ssize_t n)
 {
-    if (n != 2 || !Py_IS_TYPE(args[1], &TargetType)) {
-        PyErr_SetString(PyExc_TypeError, "step(counts, target)");
+    long counts;
+    const Target *target = arguments(args, n, &counts);
+    if (!target)
         return NULL;
-    }
-    long counts = PyLong_AsLong(args[0]);
-    if (counts == -1 && PyErr_Occurred())
-        return NULL;
-    const Target *target = (const Target *)args[1];
     double error = (target->position_counts - (double)counts) * self->radians_per_count;
     self->rate = (1.0 - self->smoothing) * self->rate + self->smoothing * (error - self->last) / self->period;
     self->last = error;
@@ -120,14 +127,10 @@ static int Servo_init(Servo *self, PyObject *args, PyObject *kwargs)
 
 static PyObject *Servo_step(Servo *self, PyObject *const *args, Py_ssize_t n)
 {
-    if (n != 2 || !Py_IS_TYPE(args[1], &TargetType)) {
-        PyErr_SetString(PyExc_TypeError, "step(counts, target)");
+    long counts;
+    const Target *target = arguments(args, n, &counts);
+    if (!target)
         return NULL;
-    }
-    long counts = PyLong_AsLong(args[0]);
-    if (counts == -1 && PyErr_Occurred())
-        return NULL;
-    const Target *target = (const Target *)args[1];
     int32_t moved = (int32_t)((uint32_t)counts - (uint32_t)self->counts);
     self->counts = (int32_t)counts;
     self->position += (int64_t)moved * 65536;

@@ -5,7 +5,7 @@
 
 use crate::engine::exact_flow::{Bed, Pushed};
 use crate::engine::{
-    Bristle, DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
+    Bristle, DormandPrince, Engine, EngineError, EngineKind, Event, Input, Motion, Shaft, Volts,
 };
 use crate::rig::Rig;
 use clutch_core::friction::{Bend, ELEMENTS, FrictionModel};
@@ -75,11 +75,6 @@ fn begin(rig: &Rig, position: f64, velocity: f64, volts: f64) -> Shaft {
     shaft
 }
 
-/// The reason that the exact flow cannot take a rig; `None` if it can.
-fn refuses(rig: &Rig) -> Option<&'static str> {
-    ExactFlow::refuses(&rig.model, rig.drive.is_constant(), rig.params.actuator_time_constant.is_some())
-}
-
 fn noise(seed: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365)
 }
@@ -100,7 +95,7 @@ impl MovingRig {
         MovingRig {
             engine: match engine {
                 EngineKind::ExactFlow => {
-                    Moves::Exactly(refuses(&rig).is_none().then(|| Bed::of(&rig.model)).flatten())
+                    Moves::Exactly(rig.refuses_exact_flow().is_none().then(|| Bed::of(&rig.model)).flatten())
                 }
                 EngineKind::DormandPrince | EngineKind::Auto => Moves::InSteps(DormandPrince::default()),
                 EngineKind::Bristle => Moves::Bending(Bristle::default()),
@@ -226,7 +221,7 @@ impl MovingRig {
                     bed.advance(&pushed, (input.time, duration), shaft, events, None)?;
                 }
                 Moves::Exactly(None) => {
-                    let needs = refuses(&self.rig).unwrap_or("a friction that it knows");
+                    let needs = self.rig.refuses_exact_flow().unwrap_or("a friction that it knows");
                     return Err(EngineError::Refused(needs));
                 }
                 Moves::InSteps(engine) => engine.advance(model, &input, shaft, events)?,

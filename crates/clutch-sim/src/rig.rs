@@ -1,7 +1,7 @@
 //! Rigs: the shaft with its brake, its sensor and its converter.
 
 use crate::drive::{Drive, DriveParams};
-use crate::engine::Model;
+use crate::engine::{ExactFlow, Model};
 use crate::ripple::{Ripple, RippleParams, RunoutParams};
 use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::params::{Params, Range};
@@ -168,6 +168,12 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// The reason that the exact flow cannot move it; `None` if it can.
+    pub(crate) fn refuses_exact_flow(&self) -> Option<&'static str> {
+        let lags = self.params.actuator_time_constant.is_some();
+        ExactFlow::refuses(&self.model, self.drive.is_constant(), lags)
+    }
+
     /// Checks the parameters; `seed` decides ripple phases and a hand's motion.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! A run before it is run: everything that it is made of, and why it may not be made.
 
-use crate::engine::{EngineError, EngineKind, ExactFlow};
+use crate::engine::{EngineError, EngineKind};
 use crate::moving_rig::MovingRig;
 use crate::rig::{Rig, RigParams};
 use clutch_core::friction::FrictionModel;
@@ -133,7 +133,6 @@ impl<'a> RunSpec<'a> {
     /// # Errors
     /// The exact flow is asked for and cannot take the rig.
     pub fn engine(&self, rig: &Rig) -> Result<EngineKind, RunError> {
-        let lags = self.rig.actuator_time_constant.is_some();
         let bends = rig.model.plant.friction().bristles().is_some();
         let asked = self.run.engine;
         let refused = |expected: String| Err(RunError::Engine { asked, expected });
@@ -152,7 +151,7 @@ impl<'a> RunSpec<'a> {
             }
             _ => {}
         }
-        match (asked, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
+        match (asked, rig.refuses_exact_flow()) {
             (EngineKind::ExactFlow, Some(needs)) => {
                 refused(format!("dormand_prince or auto: exact_flow needs {needs}"))
             }

@@ -43,7 +43,6 @@ fn made() -> Result<Vec<(&'static str, String)>, String> {
     let keys = pages::keys(&read("docs/scenario.md")?, &places)?;
     Ok(vec![
         ("python/clutch/_tables.py", python::module(&classes, &places)),
-        ("python/clutch/_names.py", python::names(&classes)),
         ("python/clutch/_metrics.py", metrics::python()),
         ("docs/scenario.schema.json", format!("{:#}\n", clutch_sim::scenario::schema())),
         ("docs/scenario.md", metrics::page(&keys).ok_or("docs/scenario.md: no markers of metrics")?),

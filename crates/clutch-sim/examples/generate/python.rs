@@ -1,4 +1,4 @@
-//! Python's classes: `python/clutch/_tables.py`; their names, which are known without them: `python/clutch/_names.py`.
+//! Python's classes: `python/clutch/_tables.py`.
 
 use super::classes::{Class, name, union};
 use super::places::{Place, default_at, join};
@@ -32,29 +32,14 @@ from clutch._record import _Params
 
 "#;
 
-const NAMES: &str = r#""""Names of the generated classes: written by `cargo xtask generate`, as `clutch._tables` is.
-
-`import clutch` knows them without importing the classes.
-"""
-
-"#;
-
-/// A list of the classes' names, as Python writes it.
-fn list(name: &str, classes: &[Class<'_>]) -> String {
+/// The module.
+pub(crate) fn module(classes: &[Class<'_>], places: &[Place]) -> String {
+    let mut out = HEAD.to_owned();
     let mut names: Vec<&str> = classes.iter().map(|class| class.name.as_str()).collect();
     names.retain(|name| !name.starts_with('_'));
     names.sort_unstable();
-    format!("{name} = [\n{}]\n", names.iter().map(|n| format!("    \"{n}\",\n")).collect::<String>())
-}
-
-/// The module of names.
-pub(crate) fn names(classes: &[Class<'_>]) -> String {
-    NAMES.to_owned() + &list("TABLES", classes)
-}
-
-/// The module.
-pub(crate) fn module(classes: &[Class<'_>], places: &[Place]) -> String {
-    let mut out = HEAD.to_owned() + &list("__all__", classes);
+    out +=
+        &format!("__all__ = [\n{}]\n", names.iter().map(|n| format!("    \"{n}\",\n")).collect::<String>());
     out += "\n#: Units by the endings of keys, metrics and columns.\nUNITS = {\n";
     for unit in UNITS.iter().filter(|unit| !unit.suffix.is_empty()) {
         out += &format!("    \"{}\": \"{}\",\n", unit.suffix, unit.text);

@@ -12,6 +12,15 @@ const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
 /// Magnitude above which an argument of an exponential is reduced: half of ln 2 in its upper word.
 const REDUCED: f64 = f64::from_bits(0x3fd6_2e43_0000_0000);
 
+/// Coefficients of an exponential's polynomial, that of a power among them.
+const P: [f64; 5] = [
+    1.666_666_666_666_660_2e-1,
+    -2.777_777_777_701_559_3e-3,
+    6.613_756_321_437_934e-5,
+    -1.653_390_220_546_525_2e-6,
+    4.138_136_797_057_238_5e-8,
+];
+
 /// Access to the bits of a number, as exponentials and logarithms need it.
 pub(crate) trait Powers: Lane {
     /// 2 to the power of a whole number from −1022 to 1023.
@@ -39,13 +48,6 @@ fn reduced<V: Powers>(x: V) -> (V, V, V) {
 
 #[inline(always)]
 pub(crate) fn exp<V: Powers>(x: V) -> V {
-    const P: [f64; 5] = [
-        1.666_666_666_666_660_2e-1,
-        -2.777_777_777_701_559_3e-3,
-        6.613_756_321_437_934e-5,
-        -1.653_390_220_546_525_2e-6,
-        4.138_136_797_057_238_5e-8,
-    ];
     let p = |i: usize| V::splat(P[i]);
     let (k, hi, lo) = reduced(x);
     let r = hi - lo;
@@ -173,13 +175,6 @@ pub(crate) fn pow<V: Powers>(x: V, y: V) -> V {
         2.727_281_238_085_34e-1,
         2.306_607_457_755_617_5e-1,
         2.069_750_178_003_384_2e-1,
-    ];
-    const P: [f64; 5] = [
-        1.666_666_666_666_660_2e-1,
-        -2.777_777_777_701_559_3e-3,
-        6.613_756_321_437_934e-5,
-        -1.653_390_220_546_525_2e-6,
-        4.138_136_797_057_238_5e-8,
     ];
     let (s, l, p) = (|x: f64| V::splat(x), |i: usize| V::splat(L[i]), |i: usize| V::splat(P[i]));
     // x = 2ⁿ m, with m around 1 or around 3/2.
