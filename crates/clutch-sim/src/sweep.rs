@@ -190,11 +190,12 @@ impl Deal {
     /// Rows one by one where samples are kept. Else as many in a batch as fill lanes: few rows are as many batches as there
     /// are threads, dealt out by the handful, so that none gets the slow end of a table.
     fn of(rows: usize, threads: usize, keep: Keep) -> Self {
+        let threads = threads.max(1);
         let (hand, batches) = match keep {
             Keep::Trace => (1, rows),
-            Keep::Figures if rows <= threads.max(1) * BATCH => {
-                let hand = rows.div_ceil(threads.max(1)).clamp(1, LANES);
-                (hand, threads.max(1).min(rows.div_ceil(hand)))
+            Keep::Figures if rows <= threads.saturating_mul(BATCH) => {
+                let hand = rows.div_ceil(threads).clamp(1, LANES);
+                (hand, threads.min(rows.div_ceil(hand)))
             }
             Keep::Figures => (BATCH, rows.div_ceil(BATCH)),
         };
@@ -261,7 +262,7 @@ mod tests {
     #[test]
     fn each_row_is_in_one_batch_and_few_rows_are_dealt_out_evenly() {
         for rows in (0..40).chain([255, 256, 257, 511, 512, 513, 1025, 4096]) {
-            for threads in [0, 1, 2, 3, 7, 64] {
+            for threads in [0, 1, 2, 3, 7, 64, usize::MAX] {
                 for keep in [Keep::Figures, Keep::Trace] {
                     let deal = Deal::of(rows, threads, keep);
                     let batches: Vec<Vec<usize>> =
@@ -271,7 +272,7 @@ mod tests {
                     assert!(all.into_iter().eq(0..rows), "{rows} rows, {threads} threads, {keep:?}");
                     let sizes = batches.iter().map(Vec::len);
                     assert!(sizes.clone().all(|n| (1..=BATCH).contains(&n)));
-                    if keep == Keep::Figures && rows <= threads.max(1) * BATCH {
+                    if keep == Keep::Figures && rows <= threads.max(1).saturating_mul(BATCH) {
                         let (least, most) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
                         assert!(most - least <= LANES, "{rows} rows, {threads} threads: {least} to {most}");
                     }
