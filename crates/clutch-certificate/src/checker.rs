@@ -15,7 +15,7 @@ mod law;
 mod mode;
 mod shaft;
 
-use crate::setup::{Case, Cell, Certificate, Form, Gains, ModeId, Setup, VERSION};
+use crate::setup::{Case, Cell, Certificate, Form, Gains, ModeId, Motor, Setup, VERSION};
 use interval::{Interval, at};
 use mode::Mode;
 use shaft::Shaft;
@@ -176,7 +176,7 @@ fn values(s: &Setup) -> Result<(), Refused> {
         }
     }
     // A shaft that is never driven backwards never runs back: all that follows rests on that.
-    if s.torque_noise >= s.drive_torque[0] {
+    if s.motor.is_none() && s.torque_noise >= s.drive_torque[0] {
         return refuse("torque_noise", s.torque_noise.to_string(), "a number below setup.drive_torque[0]");
     }
     if !(s.ripple >= 0.0 && s.ripple < 1.0) {
@@ -193,15 +193,18 @@ fn values(s: &Setup) -> Result<(), Refused> {
     }
     let ends = [
         ("inertia", s.inertia, true),
-        ("drive_torque", s.drive_torque, true),
         ("viscous_damping", s.viscous_damping, false),
-        ("brake_gain", s.brake_gain, true),
         ("sliding", s.sliding, true),
         ("at_rest", s.at_rest, true),
+    ];
+    let of_a_brake = [
+        ("drive_torque", s.drive_torque, true),
+        ("brake_gain", s.brake_gain, true),
         ("volts", s.volts, false),
         ("start_volts", s.start_volts, false),
     ];
-    for (key, [low, high], above_0) in ends {
+    let of_a_brake = of_a_brake.into_iter().filter(|_| s.motor.is_none());
+    for (key, [low, high], above_0) in ends.into_iter().chain(of_a_brake) {
         let begins = if above_0 { low > 0.0 } else { low >= 0.0 };
         if !(begins && low <= high && high.is_finite()) {
             return refuse(
@@ -211,12 +214,56 @@ fn values(s: &Setup) -> Result<(), Refused> {
             );
         }
     }
+    if let Some(motor) = &s.motor {
+        motor_values(s, motor)?;
+    }
     if !sound(&s.law) {
         return refuse(
             "law",
             format!("{:?}", s.law),
             "finite gains of at least 0, finite voltages beside them, and a boundary and a tracking time above 0",
         );
+    }
+    Ok(())
+}
+
+/// Values of an axis with a motor, which no voltage that goes out turns round.
+fn motor_values(s: &Setup, motor: &Motor) -> Result<(), Refused> {
+    let refuse = |key: &str, value: String, expected| {
+        Err(Refused::Value { key: format!("setup.{key}"), value, expected })
+    };
+    let ends = [
+        ("drive_torque", s.drive_torque),
+        ("volts", s.volts),
+        ("start_volts", s.start_volts),
+        ("motor.gain", motor.gain),
+    ];
+    for (key, [low, high]) in ends {
+        if !(low <= high && low.is_finite() && high.is_finite() && high.abs().max(low.abs()) <= 1e6) {
+            let expected = "two finite numbers, the lower first, none beyond a million";
+            return refuse(key, format!("[{low}, {high}]"), expected);
+        }
+    }
+    if motor.gain[0] <= 0.0 {
+        return refuse("motor.gain", format!("[{}, {}]", motor.gain[0], motor.gain[1]), "numbers above 0");
+    }
+    if !(motor.preload >= 0.0 && motor.preload.is_finite()) {
+        return refuse("motor.preload", motor.preload.to_string(), "a finite number of at least 0");
+    }
+    if s.converter_step > 1.0 {
+        return refuse("converter_step", s.converter_step.to_string(), "at most 1 V with a motor");
+    }
+    if matches!(s.law, Gains::Smc { .. }) {
+        return refuse("law", format!("{:?}", s.law), "PD, PID or a shell with a motor");
+    }
+    let off = at(0.5) * at(s.converter_step) + at(shaft::LAW_ROUNDING);
+    let lowest = (at(s.volts[0]) - off).min(at(s.start_volts[0]));
+    let gain = Interval { low: motor.gain[0], high: motor.gain[1] };
+    let pushed = gain * lowest + at(s.drive_torque[0]) - at(s.torque_noise);
+    let friction = at(s.at_rest[0].min(s.sliding[0])) * (at(1.0) - at(s.ripple)) * at(motor.preload);
+    if above(-pushed.low, friction.low) {
+        let expected = "a lowest voltage at which friction holds the shaft against running backwards";
+        return refuse("volts", format!("[{}, {}]", s.volts[0], s.volts[1]), expected);
     }
     Ok(())
 }
@@ -389,7 +436,8 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
     let step = Interval { low: -shaft::TARGET_STEP, high: shaft::TARGET_STEP };
     let rate = Interval { low: -near.high, high: if setup.from_rest { path.high } else { near.high } };
     let rounding = Interval { low: 0.0, high: 1.0 };
-    let volts = Interval { low: setup.start_volts[0], high: setup.start_volts[1] };
+    let [least, most] = shaft.ends(setup.start_volts);
+    let volts = Interval { low: least.low, high: most.high };
     for (k, (row, radius)) in cell.rows.iter().zip(&cell.radii).enumerate() {
         let n = row.len();
         let (ce, cs, cz, cm) = (at(row[0]), at(row[1]), at(row[2]), at(row[n - 1]));
@@ -400,7 +448,7 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
         if let Gains::Pid { kp, ki, forward, .. } = setup.law {
             let off = Interval { low: -shaft::LAW_ROUNDING, high: shaft::LAW_ROUNDING };
             of_m0 = of_m0 + at(row[ways]) * (at(kp) + at(ki) * at(setup.period_s)) * shaft.count;
-            rest = rest + at(row[ways]) * (volts + off - at(forward));
+            rest = rest + at(row[ways]) * (volts + off - shaft.counted(forward));
         }
         let mut start = (ce + of_m0) * step + of_m0 * rounding + rest;
         for c in &row[3..ways] {

@@ -14,7 +14,7 @@ mod stability;
 mod units;
 
 pub use search::{Found, OpenCell, Options, search};
-pub use setup::{Case, Cell, Certificate, Form, Gains, ModeId, Proof, Setup};
+pub use setup::{Case, Cell, Certificate, Form, Gains, ModeId, Motor, Proof, Setup};
 pub use stability::{Stability, largest, stability};
 
 #[cfg(test)]

@@ -161,11 +161,12 @@ impl<const N: usize> Mode<N> {
         out.weights[E] += ce;
         match self.id.case {
             Case::Slides | Case::LetGo => {
-                let b = if self.id.case == Case::Slides { u.brake } else { u.brake_any };
+                let slides = self.id.case == Case::Slides;
+                let (b, g) = if slides { (u.brake, u.drive) } else { (u.brake_any, u.drive_any) };
                 // ∫ (c_s + c_e (1 − τ)) ṡ dτ over the tick, ṡ between b₁ v − g₂ and b₂ v − g₁.
                 let (pro, contra) = parts(cs + ce, cs);
                 out.weights[S] += ce + cs;
-                out.constant += contra * u.drive[1] - pro * u.drive[0];
+                out.constant += contra * g[1] - pro * g[0];
                 volts(&mut out, pro * b[1] - contra * b[0], &self.applied);
             }
             Case::TouchesAndLeaves | Case::TouchesAndStays => {
@@ -183,7 +184,7 @@ impl<const N: usize> Mode<N> {
                     up -= 0.5 * ce;
                 }
                 if leaves {
-                    out.constant += up * u.drive[1];
+                    out.constant += up * u.drive_any[1];
                     volts(&mut out, -up * u.brake_leaving, &self.applied);
                 }
             }
@@ -227,7 +228,7 @@ mod tests {
     use super::*;
     use crate::pieces::tests::{answer, remembered, with_an_integral};
     use crate::pieces::{pieces, strips};
-    use crate::setup::{Gains, Setup};
+    use crate::setup::{Ends, Gains, Motor, Setup};
     use crate::tests::uniform;
 
     /// A tick of a shaft whose friction and drive vary as they may, in 4000 steps: way and speed, in counts and ticks.
@@ -254,8 +255,13 @@ mod tests {
                 factor.swap(0, 1);
             }
             let level = mu.1 + (mu.0 - mu.1) * (-(omega * speed) / s.stribeck[0]).exp();
-            let brake = factor[0] * s.brake_gain[0] * volts.max(0.0);
-            let drive = s.drive_torque[0] + push[0];
+            // The torque that presses, and the one that drives.
+            let (pressed, driven) = match &s.motor {
+                Some(motor) => (motor.preload, motor.gain[0] * (s.counted_from() - volts)),
+                None => (s.brake_gain[0] * volts.max(0.0), 0.0),
+            };
+            let brake = factor[0] * pressed;
+            let drive = s.drive_torque[0] + push[0] + driven;
             let torque = if omega == 0.0 {
                 (drive - mu.0 * brake).max(0.0)
             } else {
@@ -278,32 +284,72 @@ mod tests {
         let mut next = uniform(11);
         let mut seen = [0; 4];
         for (law, form) in laws.into_iter().flat_map(|law| [(law, Form::Noise), (law, Form::Exact)]) {
-            ticks::<4>(law, form, &mut next, &mut seen);
+            ticks::<4>(&brake(law), form, &mut next, &mut seen);
         }
         assert!(seen.iter().all(|n| *n > 20), "{seen:?}");
         let mut seen = [0; 4];
         for form in [Form::Noise, Form::Exact] {
-            ticks::<5>(with_an_integral(0.05, 0.0), form, &mut next, &mut seen);
-            ticks::<5>(with_an_integral(0.005, 1.5), form, &mut next, &mut seen);
+            ticks::<5>(&brake(with_an_integral(0.05, 0.0)), form, &mut next, &mut seen);
+            ticks::<5>(&brake(with_an_integral(0.005, 1.5)), form, &mut next, &mut seen);
         }
         assert!(seen.iter().all(|n| *n > 5), "{seen:?}");
     }
 
-    /// Ticks of a law from random states, each held against every mode that allows it; counts the shaft's cases.
-    fn ticks<const N: usize>(
-        law: Gains,
-        form: Form,
-        next: &mut dyn FnMut(f64, f64) -> f64,
-        seen: &mut [i32; 4],
-    ) {
-        let setup = Setup {
+    #[test]
+    fn a_simulated_tick_of_a_motor_axis_goes_no_further_than_its_mode_allows() {
+        let mut next = uniform(12);
+        let mut seen = [0; 4];
+        let laws =
+            [Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.6 }, Gains::Shell { slope: 50.0, boundary: 0.2 }];
+        for (law, form) in laws.into_iter().flat_map(|law| [(law, Form::Noise), (law, Form::Exact)]) {
+            for corner in 0..4 {
+                ticks::<4>(&motor(law, corner), form, &mut next, &mut seen);
+            }
+        }
+        assert!(seen.iter().all(|n| *n > 20), "{seen:?}");
+    }
+
+    fn brake(law: Gains) -> Setup {
+        Setup {
             sliding: [0.13, 0.17],
             at_rest: [0.17, 0.25],
             ripple: 0.05,
             torque_noise: 0.002,
             ..Setup::paper(law)
-        };
-        let u = Units::new(&setup, setup.sliding, 3.0);
+        }
+    }
+
+    /// An axis whose simulated shaft, which has the first of each two ends, is at a corner of inertia and torque per volt.
+    fn motor(law: Gains, corner: u32) -> Setup {
+        let ends = |low: f64, high: f64, turned: bool| if turned { [high, low] } else { [low, high] };
+        Setup {
+            drive_torque: [0.001; 2],
+            brake_gain: [0.0; 2],
+            inertia: ends(0.0016, 0.0018, corner % 2 == 1),
+            motor: Some(Motor { gain: ends(0.048, 0.052, corner / 2 == 1), preload: 0.25 }),
+            volts: [-0.3, 4.0],
+            start_volts: [0.5, 1.0],
+            stribeck: [0.003, 1.0],
+            ..brake(law)
+        }
+    }
+
+    /// The box whose shaft a setup simulates, its ends in order.
+    fn ordered(setup: &Setup) -> Setup {
+        let ends = |[a, b]: Ends| [a.min(b), a.max(b)];
+        let motor = setup.motor.map(|m| Motor { gain: ends(m.gain), ..m });
+        Setup { inertia: ends(setup.inertia), motor, ..setup.clone() }
+    }
+
+    /// Ticks of a law from random states, each held against every mode that allows it; counts the shaft's cases.
+    fn ticks<const N: usize>(
+        setup: &Setup,
+        form: Form,
+        next: &mut dyn FnMut(f64, f64) -> f64,
+        seen: &mut [i32; 4],
+    ) {
+        let u = Units::new(&ordered(setup), setup.sliding, 3.0);
+        let law = u.law;
         let modes: Vec<Mode<N>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);
         for _ in 0..400 {
             let omega = if next(0.0, 1.0) < 0.3 { next(0.0, 0.03) } else { next(0.0, 1.0) };
@@ -315,7 +361,7 @@ mod tests {
             let mu_s = next(0.17, 0.25);
             let integral = if law.remembers() { next(-1.0, 10.5) } else { 0.0 };
             let volts = answer(&u, m, z, integral) + next(-1.0, 1.0) * 0.5 * setup.converter_step;
-            let (way, after) = tick(&setup, (mu_s, mu_d), omega, volts, next);
+            let (way, after) = tick(setup, (mu_s, mu_d), omega, volts, next);
             let gone = next(0.0, 3.0).floor();
             let last = if form == Form::Exact { m - u.path + gone } else { rounding };
             let state = |first: [f64; 3], integral: f64, last: f64| -> [f64; N] {

@@ -155,9 +155,16 @@ const USUAL_COUNTS: f64 = 4.0;
 
 /// The attempt that is worth its time where a bound is far above the steady error.
 fn second(setup: &Setup, bound: f64) -> Option<(Form, (Fineness, f64))> {
-    let count = core::f64::consts::TAU / f64::from(setup.counts_per_rev);
-    let holds = setup.drive_torque[1] / (setup.sliding[0] * setup.brake_gain[0]);
-    let (attempt, steady) = match setup.law {
+    let u = Units::new(setup, setup.sliding, 0.0);
+    let count = u.count;
+    let holds = match &setup.motor {
+        Some(motor) => {
+            let torque = setup.sliding[1] * motor.preload - setup.drive_torque[0];
+            setup.counted_from() - torque / motor.gain[0]
+        }
+        None => setup.drive_torque[1] / (setup.sliding[0] * setup.brake_gain[0]),
+    };
+    let (attempt, steady) = match u.law {
         Gains::Pd { kp, forward, .. } => ((Form::Exact, SATURATED), (holds - forward).abs() / kp),
         Gains::Smc { kp, slope, boundary, .. } => {
             ((Form::Noise, SATURATED_SMC), holds * boundary / (kp * slope))
@@ -264,7 +271,7 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
     for e in [-TARGET_STEP, TARGET_STEP] {
         for s in rates {
             for rounding in [0.0, 1.0] {
-                for (volts, off) in setup.start_volts.into_iter().zip([-LAW_ROUNDING, LAW_ROUNDING]) {
+                for (volts, off) in u.start_volts.into_iter().zip([-LAW_ROUNDING, LAW_ROUNDING]) {
                     let mut x = [0.0; N];
                     (x[E], x[S], x[Z]) = (e, s, e + rounding);
                     for p in &mut x[P..P + u.delay] {
@@ -302,7 +309,8 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
         return Err((Open::Grows, 0.0));
     }
     let strips = strips(&p.setup.law, u.volts);
-    let most_counts = (cap + u.drive[1] + u.slow).ceil() as u32;
+    let fastest = u.drive[1].max(u.drive_any[1]);
+    let most_counts = (cap + fastest + u.slow).ceil() as u32;
     let modes: Vec<Mode<N>> = modes(&u, &pieces(&u, &strips), p.form, most_counts);
     let rows = rows::<N>(&u, p.form, p.fineness);
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
@@ -328,7 +336,7 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
         return Err((Open::Slow, search.speed()));
     }
     // Between samples a shaft departs from the line through its ends by at most an eighth of its acceleration.
-    let bend = u.drive[1].max(u.brake_any[1] * (u.volts[1] + u.volts_off) - u.drive[0]) / 8.0;
+    let bend = fastest.max(u.brake_any[1] * u.most_volts - u.drive_any[0]) / 8.0;
     let error = search.error() + bend;
     let (impossible, proofs) = search.proofs();
     let own = if p.form == Form::Exact { 2 * N } else { 2 * N - 2 };

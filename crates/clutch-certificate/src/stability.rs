@@ -11,7 +11,7 @@ use crate::units::Units;
 /// Spectral radius at one strength of the brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stability {
-    /// `μ_d K_COF/J`, rad/s² per volt.
+    /// `μ_d K_COF/J`, of a motor `k_t/J`, rad/s² per volt.
     pub brake: f64,
     /// Spectral radius; below 1 small deviations die out.
     pub radius: f64,
@@ -28,8 +28,14 @@ pub fn stability(setup: &Setup) -> Option<[Stability; 3]> {
     }
     let u = Units::new(setup, setup.sliding, 0.0);
     // Ripple belongs to the box; Stribeck's excess does not, as nothing moves at those speeds for long.
-    let low = setup.sliding[0] * (1.0 - setup.ripple) * setup.brake_gain[0] / setup.inertia[1];
-    let high = setup.sliding[1] * (1.0 + setup.ripple) * setup.brake_gain[1] / setup.inertia[0];
+    let [weak, strong] = match &setup.motor {
+        Some(motor) => motor.gain,
+        None => [
+            setup.sliding[0] * (1.0 - setup.ripple) * setup.brake_gain[0],
+            setup.sliding[1] * (1.0 + setup.ripple) * setup.brake_gain[1],
+        ],
+    };
+    let (low, high) = (weak / setup.inertia[1], strong / setup.inertia[0]);
     let in_counts = setup.period_s * setup.period_s / u.count;
     let at = |brake| Stability { brake, radius: spectral_radius(&closed_loop(&u, brake * in_counts)) };
     Some([low, libm::sqrt(low * high), high].map(at))

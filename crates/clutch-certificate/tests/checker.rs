@@ -1,7 +1,9 @@
 //! The checker passes what was found, and refuses each change that takes something from a proof.
 
 use clutch_certificate::checker::{Flaw, Refused, check};
-use clutch_certificate::{Case, Certificate, Form, Gains, Options, Setup, file, largest, search, stability};
+use clutch_certificate::{
+    Case, Certificate, Form, Gains, Motor, Options, Setup, file, largest, search, stability,
+};
 use std::sync::OnceLock;
 
 /// The paper's shaft on a ramp, known exactly.
@@ -323,4 +325,92 @@ fn a_start_with_more_volts_than_the_set_holds_is_refused() {
     let mut higher = proven.clone();
     higher.setup.start_volts[1] = 2.0 * higher.setup.volts[1];
     assert!(check(&proven).is_ok() && check(&higher).is_err());
+}
+
+/// A motor axis on a ramp, with a converter that does not turn it round; its law knows the middle of its friction.
+fn motor(law: Gains) -> Setup {
+    Setup {
+        drive_torque: [-0.0005, 0.0005],
+        brake_gain: [0.0; 2],
+        motor: Some(Motor { gain: [0.05; 2], preload: 0.25 }),
+        inertia: [0.00168, 0.00172],
+        sliding: [0.118, 0.122],
+        at_rest: [0.19, 0.21],
+        stribeck: [0.005, 1.0],
+        volts: [-0.4, 4.0],
+        start_volts: [-0.01, 0.01],
+        from_rest: true,
+        smoothing: 0.5,
+        ..Setup::paper(law)
+    }
+}
+
+#[test]
+fn a_motor_axis_has_a_bound_of_a_few_counts_and_each_change_of_it_is_refused() {
+    let pd = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.6 };
+    let setup = motor(pd);
+    let one = Options { refinements: 0, widest: 1.1, ..Options::default() };
+    let good = search(&setup, &one, false);
+    assert!(good.complete(), "{:?}", good.open);
+    let good = good.certificate;
+    let bound = degrees(&good);
+    assert!((0.03..0.09).contains(&bound), "{bound}°");
+    let radii = stability(&setup).expect("a linear loop");
+    assert!((0.5..1.0).contains(&largest(&radii)), "{radii:?}");
+    let change = |f: &dyn Fn(&mut Setup)| {
+        let mut bad = good.clone();
+        f(&mut bad.setup);
+        assert_ne!(bad.setup, good.setup);
+        assert!(check(&bad).is_err(), "{:?}", bad.setup.differences(&good.setup));
+    };
+    let gain = |s: &mut Setup, gain: [f64; 2]| s.motor = Some(Motor { gain, preload: 0.25 });
+    change(&|s| gain(s, [0.049, 0.05]));
+    change(&|s| gain(s, [0.05, 0.051]));
+    change(&|s| s.motor = Some(Motor { gain: [0.05; 2], preload: 0.26 }));
+    change(&|s| s.motor = Some(Motor { gain: [0.05; 2], preload: 0.24 }));
+    change(&|s| s.motor = None);
+    change(&|s| s.drive_torque[1] = 0.002);
+    change(&|s| s.drive_torque[0] = -0.002);
+    change(&|s| s.inertia[0] = 0.0016);
+    change(&|s| s.inertia[1] = 0.0018);
+    change(&|s| s.sliding[1] = 0.125);
+    change(&|s| s.at_rest[1] = 0.25);
+    change(&|s| s.ripple = 0.02);
+    change(&|s| s.volts[1] = 6.0);
+    change(&|s| s.law = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.65 });
+    change(&|s| s.law = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.55 });
+    change(&|s| s.law = Gains::Pd { kp: 480.0, kd: 8.0, forward: 0.6 });
+    change(&|s| s.delay_ticks = 1);
+}
+
+#[test]
+fn a_motor_that_may_turn_its_shaft_round_is_refused_whatever_the_proofs_say() {
+    let shell = motor(Gains::Shell { slope: 50.0, boundary: 0.2 });
+    let one = Options { refinements: 0, patient: false, widest: 1.1, ..Options::default() };
+    let good = search(&Setup { smoothing: 0.2, ..shell }, &one, false);
+    assert!(good.complete(), "{:?}", good.open);
+    let good = good.certificate;
+    assert!((0.3..1.0).contains(&degrees(&good)), "{}°", degrees(&good));
+    let told = |f: &dyn Fn(&mut Setup)| {
+        let mut bad = good.clone();
+        f(&mut bad.setup);
+        check(&bad).unwrap_err().to_string()
+    };
+    // Friction of 0.118 × 0.25 N m less the load holds 0.58 V.
+    assert!(told(&|s| s.volts[0] = -0.6).contains("setup.volts is [-0.6, 4]"));
+    assert!(
+        told(&|s| s.start_volts[0] = -0.6).contains("friction holds the shaft against running backwards")
+    );
+    assert!(told(&|s| s.torque_noise = 0.02).contains("setup.volts"));
+    assert!(
+        told(&|s| s.law = Gains::Smc { kp: 1.0, kd: 1.0, slope: 50.0, boundary: 0.2 })
+            .contains("with a motor")
+    );
+    assert!(told(&|s| s.motor = Some(Motor { gain: [0.0, 0.05], preload: 0.25 })).contains("motor.gain"));
+    assert!(
+        told(&|s| s.motor = Some(Motor { gain: [0.05; 2], preload: f64::NAN }))
+            .contains("motor.preload is NaN")
+    );
+    assert!(told(&|s| s.converter_step = 2.0).contains("converter_step is 2"));
+    assert!(told(&|s| s.drive_torque = [1.0, -1.0]).contains("setup.drive_torque"));
 }

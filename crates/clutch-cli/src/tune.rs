@@ -20,12 +20,14 @@ use std::path::{Path, PathBuf};
 /// Finds the law and the gains that move a rig most smoothly, certified.
 ///
 /// Candidates of each law run on simulated rigs at the corners of the bounds, on discs that no gain was chosen on; the
-/// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. The scenario's path
-/// is a ramp; its law is tried with its own gains, too. Exit code 0: gains are given out; 2: none is certified, or none
-/// starts from rest.
+/// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. The scenario's law
+/// is tried with its own gains, too. On a ramp smooth means without sticks; along another path the error counts. Motors, and
+/// paths that are no ramps, have no certificate yet: they need --uncertified. Exit code 0: gains are given out; 2: none is
+/// certified, or none starts from rest.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  clutch tune board_smc_2 --identified rig.toml --out tuned.toml\n  \
     clutch tune mine.toml --rates 1,2,6 --html tuned.html\n  \
+    clutch tune motor_pid --uncertified --out tuned.toml\n  \
     clutch loop tuned.toml --certificate proof.json   # after --save proof.json\n\n\
     docs/tune.md says what is tried, on what, and what is proven.")]
 pub(crate) struct Tune {
@@ -168,7 +170,7 @@ fn certified(c: &Candidate) -> String {
 
 /// A row for each candidate, under a head.
 fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
-    let head = ["law", "cost", "cycles/s", "stick in", "longest", "error", "proven"];
+    let head = ["law", "cost", "cycles/s", "stick in", "longest", "error", "V/s", "proven"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for c in &tuned.candidates {
         let s = &c.score;
@@ -180,6 +182,7 @@ fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
             cell(format!("{}/{}", s.runs_with_sticks, s.runs)),
             cell(format!("{:.0} ms", 1e3 * s.longest_stick_s)),
             cell(format!("{:.3}°", s.max_error_rad.to_degrees())),
+            cell(format!("{:.0}", s.control_variation_v_s)),
             certified(c),
         ]);
     }
@@ -188,16 +191,22 @@ fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
 
 /// The runs behind the table.
 fn about(tuned: &Tuned) -> String {
-    let rates: Vec<String> = tuned.rates_deg_s.iter().map(|r| number(*r)).collect();
+    let n = tuned.corners.len();
+    let corners = format!("{n} {} of the bounds", if n == 1 { "corner" } else { "corners" });
+    let (at, settling, cost) = if tuned.rates_deg_s.is_empty() {
+        (
+            "Along the scenario's path".to_owned(),
+            "run.settle_s",
+            "30 × RMS error, ° + 10 × largest error, °: where a path turns round every shaft rests, and sticks do not count",
+        )
+    } else {
+        let rates: Vec<String> = tuned.rates_deg_s.iter().map(|r| number(*r)).collect();
+        let at = format!("At {} °/s", rates.join(", "));
+        (at, "the first second", "cycles/s + 30 × RMS error, ° + longest stick/20 ms")
+    };
     format!(
-        "At {} °/s, from rest, {} of the bounds; figures are the worst of runs on discs 101 to 108, the first second left out. Cost: \
-         cycles/s + 30 × RMS error, ° + longest stick/20 ms. {:.0} s were simulated.",
-        rates.join(", "),
-        if tuned.corners.len() == 1 {
-            "1 corner".to_owned()
-        } else {
-            format!("{} corners", tuned.corners.len())
-        },
+        "{at}, from rest, {corners}; figures are the worst of runs on discs 101 to 108, {settling} left out. Cost: {cost}. {:.0} s \
+         were simulated.",
         tuned.simulated_s
     )
 }
@@ -206,7 +215,7 @@ fn text(tuned: &Tuned) -> String {
     let mut table = Table::new();
     table.load_style(TableStyle::new()).set_content_arrangement(ContentArrangement::Disabled);
     table.add_rows(rows(tuned));
-    for n in 1..7 {
+    for n in 1..8 {
         if let Some(column) = table.column_mut(n) {
             column.set_cell_alignment(CellAlignment::Right);
             column.set_padding((1, 0));
@@ -226,7 +235,17 @@ fn text(tuned: &Tuned) -> String {
         let (tried, unstable) = c.tried;
         let left_out =
             if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
-        out += &paragraph(&format!("{}: {}; {tried} sets of gains{left_out}", c.name, lost(c)));
+        // What holds for all of them is said once.
+        let why = match &c.standing {
+            Standing::Uncertified { why } if Some(why) == tuned.uncovered.as_ref() => {
+                "uncertified".to_owned()
+            }
+            _ => lost(c),
+        };
+        out += &paragraph(&format!("{}: {why}; {tried} sets of gains{left_out}", c.name));
+    }
+    if let Some(why) = &tuned.uncovered {
+        out += &paragraph(&format!("no law is certified here: {why}"));
     }
     for (shell, why) in &tuned.open_shells {
         out += &paragraph(&format!(
@@ -245,10 +264,13 @@ fn text(tuned: &Tuned) -> String {
             out += "  the scenario's own gains, or the law's defaults\n";
         }
         if let Some(s) = &tuned.from_rest {
+            let (at, sticks) = match tuned.rates_deg_s.first() {
+                Some(rate) => (format!("at {} °/s ", number(*rate)), "no stick after the first second, "),
+                None => (String::new(), ""),
+            };
             out += &paragraph(&format!(
-                "accepted: {} starts from rest at {} °/s on discs 201 to 210: no stick after the first second, error up to {:.3}°",
+                "accepted: {} starts from rest {at}on discs 201 to 210: {sticks}error up to {:.3}°",
                 s.runs,
-                number(tuned.rates_deg_s[0]),
                 s.max_error_rad.to_degrees()
             ));
         }
@@ -259,9 +281,10 @@ fn text(tuned: &Tuned) -> String {
 /// Disc of the picture: the first of those that candidates are judged on.
 const DRAWN: i64 = 101;
 
-/// The error over time of each candidate, at the lowest rate, on the believed rig.
+/// The error over time of each candidate, at the lowest rate, or along the path, on the believed rig.
 fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
     let mut panels = Vec::new();
+    let lowest = tuned.rates_deg_s.first().copied();
     for c in &tuned.candidates {
         let Some(scenario) = &c.scenario else { continue };
         let title = match c.standing {
@@ -272,7 +295,7 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
             title,
             x_label: "t, s".to_owned(),
             y_label: "error, °".to_owned(),
-            series: vec![errors(scenario, tuned.rates_deg_s[0])?],
+            series: vec![errors(scenario, lowest)?],
             ..Panel::default()
         });
     }
@@ -286,9 +309,9 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
     }
     Ok(Figure {
         title: format!(
-            "{}: error at {} °/s from rest, disc {DRAWN}",
+            "{}: error {}from rest, disc {DRAWN}",
             tuned.believed.name(),
-            number(tuned.rates_deg_s[0])
+            lowest.map_or(String::new(), |rate| format!("at {} °/s ", number(rate)))
         ),
         columns: 2,
         panels,
@@ -296,13 +319,15 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
     })
 }
 
-fn errors(scenario: &Scenario, rate: f64) -> Result<Series, ScenarioError> {
-    let set = [
-        (RATE.to_owned(), Value::Float(rate)),
-        ("run.seed".to_owned(), Value::Integer(DRAWN)),
-        ("run.duration_s".to_owned(), Value::Float(5.0)),
-        ("run.settle_s".to_owned(), Value::Float(1.0)),
-    ];
+fn errors(scenario: &Scenario, rate: Option<f64>) -> Result<Series, ScenarioError> {
+    let mut set = vec![("run.seed".to_owned(), Value::Integer(DRAWN))];
+    if let Some(rate) = rate {
+        set.extend([
+            (RATE.to_owned(), Value::Float(rate)),
+            ("run.duration_s".to_owned(), Value::Float(5.0)),
+            ("run.settle_s".to_owned(), Value::Float(1.0)),
+        ]);
+    }
     let here = Scenario::from_table(scenario.name(), scenario.table().clone(), &set)?;
     let trace = here.run(Keep::Trace, UNWATCHED)?.trace;
     let errors = Envelope::new(&trace.time, &trace.error, PARTS);

@@ -2,8 +2,9 @@
 
 use crate::rig_file::RigFile;
 use clutch_core::friction::FrictionParams;
-use clutch_core::{ActuatorKind, Interval};
+use clutch_core::{ActuatorKind, ActuatorParams, Interval};
 use clutch_sim::drive::DriveParams;
+use clutch_sim::rig::RigParams;
 use clutch_sim::{Scenario, ScenarioError};
 use toml::{Table, Value};
 
@@ -14,17 +15,43 @@ pub struct Believed {
     pub scenario: Scenario,
     /// Reason why the delay found is no whole number of periods, which all that is certified assumes; none if it is one.
     pub delay_between: Option<String>,
-    /// T/J and T/(μ_d K) of the corners of the bounds, as shares of the believed ones.
+    /// Corners of the bounds.
     pub corners: Vec<Corner>,
 }
 
-/// A corner of the bounds: motion under a brake depends on these two ratios, and little on damping.
+/// A corner of the bounds, as factors on the believed rig. Under a brake motion depends on T/J and T/(μ_d K), and little on
+/// damping: the corners are those of the two ratios, and friction is the believed one. Of a motor, whose torque per volt is
+/// known, they are those of load, inertia and friction.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Corner {
-    /// T/J over the believed one.
-    pub pull: f64,
-    /// T/(μ_d K) over the believed one.
-    pub hold: f64,
+    /// On the torque of drive or load.
+    pub torque: f64,
+    /// On inertia and damping.
+    pub inertia: f64,
+    /// On the friction of a motor axis.
+    pub friction: f64,
+}
+
+impl Corner {
+    /// The rig as it is believed to be.
+    pub const BELIEVED: Corner = Corner { torque: 1.0, inertia: 1.0, friction: 1.0 };
+
+    /// The believed rig at this corner.
+    pub fn apply(&self, rig: &mut RigParams) {
+        match &mut rig.drive {
+            DriveParams::Weight(weight) => weight.mass *= self.torque,
+            DriveParams::Table(load) => {
+                load.points.0.iter_mut().for_each(|(_, torque)| *torque *= self.torque)
+            }
+            _ => {}
+        }
+        rig.inertia *= self.inertia;
+        rig.viscous_damping *= self.inertia;
+        if let ActuatorParams::Motor(motor) = &mut rig.actuator {
+            motor.preload *= self.friction;
+            motor.load_share *= self.friction;
+        }
+    }
 }
 
 /// Stribeck velocity that is reckoned with where none is determined, rad/s: the largest of the rigs that identification was tried on.
@@ -40,18 +67,14 @@ const NUMBER: i64 = 4;
 /// it these are those of the scenario's rig.
 ///
 /// # Errors
-/// The rig is driven by other than a brake, or is refused.
+/// The rig has a brake and a motor on one signal, or is refused.
 pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed, ScenarioError> {
     let kind = scenario.spec().rig.actuator.kind();
     let refuse = |key: &str, value: &str, expected: &str| {
         Err(ScenarioError::value(scenario.name(), key, value, expected))
     };
-    if kind != ActuatorKind::Brake {
-        return refuse(
-            "rig.actuator",
-            kind.name(),
-            "brake, which drives nothing and is all that can be identified and tuned",
-        );
+    if kind == ActuatorKind::Both {
+        return refuse("rig.actuator", kind.name(), "a brake or a motor, which can be identified and tuned");
     }
     let mut table = scenario.table().clone();
     // Trials run on other discs.
@@ -61,7 +84,7 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     }
     let told = Scenario::from_table(scenario.name(), table.clone(), &[])?;
     let spec = told.spec();
-    if spec.model.drive_torque <= 0.0 {
+    if kind == ActuatorKind::Brake && spec.model.drive_torque <= 0.0 {
         return refuse(
             "model.drive_torque_nm",
             &spec.model.drive_torque.to_string(),
@@ -90,10 +113,6 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
         }
         set.push(("rig.delay_ticks".to_owned(), Value::Integer(ticks as i64)));
     }
-    let weight = match spec.rig.drive {
-        DriveParams::Weight(w) => (w.gravity, w.pulley_radius),
-        _ => (9.81, 0.024),
-    };
     let model = table_of(told.table(), "model");
     let mut rig = table_of(told.table(), "rig");
     for key in ["inertia_kg_m2", "viscous_damping_nm_s_rad", "friction", "actuator"] {
@@ -101,13 +120,9 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
             rig.insert(key.to_owned(), value.clone());
         }
     }
-    let mass = spec.model.drive_torque / (weight.0 * weight.1);
-    let weight = [("mass_kg", mass), ("gravity_m_s2", weight.0), ("pulley_radius_m", weight.1)];
-    let weight = weight.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect::<Table>();
-    rig.insert(
-        "drive".to_owned(),
-        Value::Table(Table::from_iter([("weight".to_owned(), Value::Table(weight))])),
-    );
+    let torque = spec.model.drive_torque;
+    let drive = if kind == ActuatorKind::Brake { weight(&spec.rig.drive, torque) } else { load(torque) };
+    rig.insert("drive".to_owned(), Value::Table(drive));
     if let Some(ripple) = file.and_then(|file| file.ripple) {
         rig.insert("ripple".to_owned(), Value::Table(waves(&rig, ripple.value)));
         rig.remove("runout");
@@ -117,6 +132,25 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     let scenario = Scenario::from_table(scenario.name(), table, &set)?;
     let corners = corners(&scenario)?;
     Ok(Believed { scenario, delay_between, corners })
+}
+
+/// A weight that drives with that torque, N m, on the rig's own pulley where it has one.
+fn weight(own: &DriveParams, torque: f64) -> Table {
+    let (gravity, radius) = match own {
+        DriveParams::Weight(w) => (w.gravity, w.pulley_radius),
+        _ => (9.81, 0.024),
+    };
+    let rows =
+        [("mass_kg", torque / (gravity * radius)), ("gravity_m_s2", gravity), ("pulley_radius_m", radius)];
+    let rows = rows.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect();
+    Table::from_iter([("weight".to_owned(), Value::Table(rows))])
+}
+
+/// A constant load, N m.
+fn load(torque: f64) -> Table {
+    let point = Value::Array(vec![Value::Float(0.0), Value::Float(torque)]);
+    let rows = Table::from_iter([("points_s_nm".to_owned(), Value::Array(vec![point]))]);
+    Table::from_iter([("table".to_owned(), Value::Table(rows))])
 }
 
 fn table_of(table: &Table, key: &str) -> Table {
@@ -154,21 +188,45 @@ fn waves(rig: &Table, rms: f64) -> Table {
 /// Ratios known more closely than this, end from end, are taken for known: discs differ by more.
 const NARROW: f64 = 0.01;
 
-/// Both ends of both ratios; one where a ratio is known.
+/// Both ends of what motion depends on; one where it is known.
 fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
     let bounds = scenario.plan()?.bounds;
     let model = scenario.spec().model;
     let shares = |i: &Interval, value: f64| [i.low / value, i.high / value];
-    let torque = shares(&bounds.drive_torque, model.drive_torque);
     let inertia = shares(&bounds.inertia, model.inertia);
+    let (friction, _) = scenario.params().bounds.friction_shares(0.0);
+    let ends = |[low, high]: [f64; 2]| if high - low < NARROW { vec![1.0] } else { vec![low, high] };
+    let mut torque = [1.0; 2];
+    if model.drive_torque != 0.0 {
+        // A load that acts backwards is negative at both ends.
+        let [a, b] = shares(&bounds.drive_torque, model.drive_torque);
+        torque = [a.min(b), a.max(b)];
+    }
+    if bounds.actuator == ActuatorKind::Motor {
+        let gain = shares(&bounds.motor_gain, 0.5 * (bounds.motor_gain.low + bounds.motor_gain.high));
+        // A load beside the friction counts by its share of that.
+        let beside = bounds.friction_sliding.low * bounds.preload;
+        if (torque[1] - torque[0]) * model.drive_torque.abs() < NARROW * beside {
+            torque = [1.0; 2];
+        }
+        // What counts is each over the torque per volt.
+        let over = |[low, high]: [f64; 2]| ends([low / gain[1], high / gain[0]]);
+        let mut corners = Vec::new();
+        for torque in over(torque) {
+            for inertia in over(inertia) {
+                corners.extend(over(friction).into_iter().map(|friction| Corner {
+                    torque,
+                    inertia,
+                    friction,
+                }));
+            }
+        }
+        return Ok(corners);
+    }
     let middle = 0.5 * (bounds.brake_gain.low + bounds.brake_gain.high);
     let gain = shares(&bounds.brake_gain, middle);
-    let (friction, _) = scenario.params().bounds.friction_shares(0.0);
-    let pull = [torque[0] / inertia[1], torque[1] / inertia[0]];
-    let hold = [torque[0] / (friction[1] * gain[1]), torque[1] / (friction[0] * gain[0])];
-    let ends = |[low, high]: [f64; 2]| if high - low < NARROW { vec![1.0] } else { vec![low, high] };
-    Ok(ends(pull)
-        .into_iter()
-        .flat_map(|pull| ends(hold).into_iter().map(move |hold| Corner { pull, hold }))
-        .collect())
+    let pull = ends([torque[0] / inertia[1], torque[1] / inertia[0]]);
+    let hold = ends([torque[0] / (friction[1] * gain[1]), torque[1] / (friction[0] * gain[0])]);
+    let at = |pull: f64, hold: f64| Corner { torque: hold, inertia: hold / pull, friction: 1.0 };
+    Ok(pull.into_iter().flat_map(|pull| hold.iter().map(move |hold| at(pull, *hold))).collect())
 }

@@ -9,23 +9,20 @@
 #[allow(dead_code, reason = "its motors are of another example")]
 mod random_rig;
 
+#[path = "course/mod.rs"]
+mod course;
+
 use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::rig_file::rig_file;
 use clutch_identify::{RigFile, identify};
-use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_loop::station::ControllerStation;
-use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
-use clutch_node::ControllerNode;
+use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::rig::Rig;
-use clutch_sim::scenario::{Table, Value};
-use clutch_sim::{Metrics, Scenario};
+use clutch_sim::scenario::Table;
 use clutch_tune::{Options, Tuned, Verdict, tune};
+use course::{Driven, Kept, degrees, drive, known, median, on_hidden, rigs_and_seed};
 use random_rig::{Outcome, Truth, truth};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::hash::{DefaultHasher, Hasher};
-use std::io::{BufRead, BufReader, Write};
 use std::time::Instant;
 
 /// Length of the loop's run, s, of which the first second does not count.
@@ -35,7 +32,6 @@ const SETTLE_S: f64 = 1.0;
 /// A rig from the experiment to the loop: what the table asks of it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Course {
-    seed: u64,
     /// Delay of the hidden rig, periods.
     delay_ticks: u32,
     /// The proven bound on the error, rad.
@@ -49,46 +45,6 @@ struct Course {
     tuning_s: f64,
     /// All of it in words.
     told: String,
-}
-
-/// The input of tuning: the hidden rig's bounds and safe state, and of its rig nothing.
-fn known(truth: &Truth) -> Outcome<Scenario> {
-    let mut table = truth.scenario.table().clone();
-    table.insert(
-        "rig".to_owned(),
-        Value::Table(Table::from_iter([("base".to_owned(), Value::String("paper".to_owned()))])),
-    );
-    Ok(Scenario::from_table("rig", table, &[])?)
-}
-
-/// The tuned law on the hidden rig.
-fn on_hidden(tuned: &Scenario, truth: &Truth) -> Outcome<Scenario> {
-    let mut table = tuned.table().clone();
-    if let Some(rig) = truth.scenario.table().get("rig") {
-        table.insert("rig".to_owned(), rig.clone());
-    }
-    let set = [
-        ("run.duration_s".to_owned(), Value::Float(LOOP_S)),
-        ("run.settle_s".to_owned(), Value::Float(SETTLE_S)),
-        ("run.seed".to_owned(), Value::Integer(truth.scenario.params().run.seed as i64)),
-    ];
-    Ok(Scenario::from_table("loop", table, &set)?)
-}
-
-/// The loop in virtual time, on the simulated board: figures by the true motion.
-fn drive(scenario: &Scenario) -> Outcome<(Metrics, f64, Option<String>)> {
-    let built = BuiltRun::<f64>::new(scenario, 1)?;
-    let path = from_scenario::path::<f64>(scenario)?;
-    let options = VirtualOptions {
-        duration: scenario.spec().run.duration + 1.0,
-        ticks: built.ticks,
-        settle: SETTLE_S,
-        ..VirtualOptions::default()
-    };
-    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let report = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?.run(&path)?;
-    let ended = report.cause.map(|cause| format!("{cause:?}"));
-    Ok((report.metrics, report.largest_error, ended))
 }
 
 /// Largest departure of friction from its mean that the disc has, as a share.
@@ -131,14 +87,13 @@ fn course(seed: u64) -> Outcome<Course> {
     let file = RigFile::parse("rig.toml", &file)?;
     let start = Instant::now();
     let options = Options { uncertified: true, ..Options::default() };
-    let tuned = tune(&known(&truth)?, Some(&file), &options, UNWATCHED)?;
+    let tuned = tune(&known(&truth.scenario, Table::new())?, Some(&file), &options, UNWATCHED)?;
     let tuning_s = start.elapsed().as_secs_f64();
     let winner = tuned.winner().and_then(|w| w.scenario.clone());
     let outside = winner.as_ref().map_or(Ok(Vec::new()), |w| outside(w, &truth))?;
-    let run = winner.map(|w| drive(&on_hidden(&w, &truth)?)).transpose()?;
-    let smooth = |m: &Metrics, ended: &Option<String>| m.stick_time_fraction == 0.0 && ended.is_none();
+    let run = winner.map(|w| drive(&on_hidden(&w, &truth.scenario, [LOOP_S, SETTLE_S])?)).transpose()?;
+    let smooth = |d: &Driven| d.metrics.stick_time_fraction == 0.0 && d.ended.is_none();
     Ok(Course {
-        seed,
         delay_ticks: (truth.delay * 1e3).round() as u32,
         bound_rad: match tuned.winner().map(|w| &w.verdict) {
             Some(Verdict::Certified { error_rad, .. }) => Some(*error_rad),
@@ -146,14 +101,14 @@ fn course(seed: u64) -> Outcome<Course> {
         },
         told: told(&truth, &tuned, run.as_ref(), tuning_s),
         outside: outside.into_iter().map(str::to_owned).collect(),
-        run: run.map(|(m, error, ended)| (error, smooth(&m, &ended))),
+        run: run.map(|d| (d.largest_error, smooth(&d))),
         simulated_s: tuned.simulated_s,
         tuning_s,
     })
 }
 
 /// A rig's course in words: what was given out and what it did; where nothing certified was, what limits.
-fn told(truth: &Truth, tuned: &Tuned, run: Option<&(Metrics, f64, Option<String>)>, tuning_s: f64) -> String {
+fn told(truth: &Truth, tuned: &Tuned, run: Option<&Driven>, tuning_s: f64) -> String {
     let mut text = format!(
         "delay {:.0} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %: ",
         1e3 * truth.delay,
@@ -171,11 +126,11 @@ fn told(truth: &Truth, tuned: &Tuned, run: Option<&(Metrics, f64, Option<String>
     };
     text += &match run {
         None => "; no run".to_owned(),
-        Some((m, error, ended)) => format!(
+        Some(d) => format!(
             "; {:.2} cycles/s, error up to {:.3}°{}",
-            m.stick_slip_cycles_per_s,
-            error.to_degrees(),
-            ended.as_ref().map_or(String::new(), |cause| format!(", ended by {cause}"))
+            d.metrics.stick_slip_cycles_per_s,
+            d.largest_error.to_degrees(),
+            d.ended.as_ref().map_or(String::new(), |cause| format!(", ended by {cause}"))
         ),
     };
     text += &format!("; {tuning_s:.1} s of tuning");
@@ -190,70 +145,27 @@ fn told(truth: &Truth, tuned: &Tuned, run: Option<&(Metrics, f64, Option<String>
     text
 }
 
-/// Rigs that are done are kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
-/// anew begins anew.
-struct Kept {
-    file: File,
-    done: Vec<Course>,
-}
-
-impl Kept {
-    fn open() -> Outcome<Kept> {
-        let program = std::env::current_exe()?;
-        let mut bytes = DefaultHasher::new();
-        bytes.write(&std::fs::read(&program)?);
-        let path = program.with_extension(format!("{:016x}.jsonl", bytes.finish()));
-        let file = File::options().create(true).append(true).read(true).open(&path)?;
-        // A line that was cut off is done again.
-        let lines = BufReader::new(&file).lines().collect::<Result<Vec<_>, _>>()?;
-        let done = lines.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
-        Ok(Kept { file, done })
-    }
-
-    fn course(&mut self, seed: u64) -> Outcome<Course> {
-        if let Some(course) = self.done.iter().find(|c| c.seed == seed) {
-            return Ok(course.clone());
-        }
-        let course = course(seed)?;
-        writeln!(self.file, "{}", serde_json::to_string(&course)?)?;
-        Ok(course)
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 /// A row over some rigs.
 fn row(name: &str, of: &[&Course]) -> String {
     let count = |f: &dyn Fn(&Course) -> bool| of.iter().filter(|c| f(c)).count();
-    let degrees = |values: Vec<f64>| {
-        let most = values.iter().copied().fold(0.0, f64::max);
-        if values.is_empty() { "–".to_owned() } else { format!("{:.3}°, {most:.3}°", median(values)) }
-    };
-    let bounds = of.iter().filter_map(|c| c.bound_rad).map(f64::to_degrees).collect();
-    let errors = of.iter().filter_map(|c| Some(c.run?.0.to_degrees())).collect();
     let (n, certified) = (of.len(), count(&|c| c.bound_rad.is_some()));
     format!(
         "| {name} | {n} | {} of {n} | {certified} of {n} | {} of {certified} | {} | {} | {} |",
         count(&|c| c.run.is_some_and(|(_, smooth)| smooth)),
         count(&|c| c.bound_rad.is_some() && c.outside.is_empty()),
-        degrees(bounds),
-        degrees(errors),
+        degrees(of.iter().filter_map(|c| c.bound_rad)),
+        degrees(of.iter().filter_map(|c| Some(c.run?.0))),
         count(&|c| c.bound_rad.zip(c.run).is_some_and(|(bound, (error, _))| error > bound)),
     )
 }
 
 fn main() -> Outcome<()> {
-    let mut args = std::env::args().skip(1);
-    let mut number = |default: u64| args.next().map_or(Ok(default), |text| text.parse::<u64>());
-    let (rigs, first) = (number(50)?, number(30_001)?);
+    let (rigs, first) = rigs_and_seed()?;
     let mut kept = Kept::open()?;
-    let mut done = Vec::new();
+    let mut done: Vec<Course> = Vec::new();
     // One after another: each takes all cores, and its time is its own.
     for seed in first..first + rigs {
-        match kept.course(seed) {
+        match kept.course(seed, course) {
             Ok(course) => {
                 println!("rig {seed}: {}", course.told);
                 done.push(course);

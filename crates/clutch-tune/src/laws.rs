@@ -1,8 +1,9 @@
 //! Laws that are tried, and the gains of each candidate.
 
-use clutch_core::Plant;
+use clutch_core::friction::FrictionModel as _;
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
+use clutch_core::{ActuatorKind, Plant};
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::{Scenario, ScenarioError};
 
@@ -15,6 +16,8 @@ pub(crate) struct Family {
     gains: &'static [Gain],
     /// Keys of the law for what is known of the rig.
     told: &'static [(&'static str, Told)],
+    /// Tried along paths that may rest and turn round alone.
+    pub(crate) for_turns: bool,
 }
 
 /// Something known of the rig that a law is told.
@@ -26,8 +29,27 @@ enum Told {
     Lag,
     /// Periods from a sample to its voltage.
     Delay,
-    /// Voltage that holds the believed shaft while it slides, V.
+    /// Voltage that holds the believed shaft while it slides, V; of a motor, that balances its load.
     Holding,
+    /// Voltage of a motor against the friction of a sliding shaft, V.
+    Friction,
+    /// Voltage over velocity against the damping, V s/rad.
+    Damping,
+    /// Voltage over acceleration for the inertia, V s²/rad.
+    Inertia,
+    /// Rate below which micro-steps are taken, °/s.
+    Steps,
+}
+
+/// Unit of a gain's ends.
+#[derive(Clone, Copy)]
+enum Unit {
+    /// As the key has it.
+    Own,
+    /// [`Volts::motion`].
+    Motion,
+    /// [`Volts::friction`].
+    Friction,
 }
 
 /// A gain, and between which ends it is drawn, evenly in ratio.
@@ -35,38 +57,80 @@ struct Gain {
     key: &'static str,
     low: f64,
     high: f64,
-    /// Its unit has volts: both ends count in voltages that hold the sliding shaft.
-    volts: bool,
+    unit: Unit,
 }
 
 const fn plain(key: &'static str, low: f64, high: f64) -> Gain {
-    Gain { key, low, high, volts: false }
+    Gain { key, low, high, unit: Unit::Own }
 }
 
 const fn volts(key: &'static str, low: f64, high: f64) -> Gain {
-    Gain { key, low, high, volts: true }
+    Gain { key, low, high, unit: Unit::Motion }
 }
 
 /// A law that is told nothing.
 const fn family(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
-    Family { key, name, gains, told: &[] }
+    Family { key, name, gains, told: &[], for_turns: false }
 }
+
+/// Acceleration of the paper's shaft without a brake, rad/s²: ends of gains in volts were chosen on it.
+const PAPER_PULL: f64 = 27.7;
+
+/// Voltages by which gains with volts in their unit are measured, V.
+pub(crate) struct Volts {
+    /// The voltage that holds the sliding shaft; of a motor the one that accelerates it with 27.7 rad/s².
+    motion: f64,
+    /// The same of a brake; of a motor the one that friction at rest takes.
+    friction: f64,
+}
+
+impl Volts {
+    /// Those of the believed shaft.
+    pub(crate) fn of(scenario: &Scenario) -> Volts {
+        let plain = Volts { motion: 1.0, friction: 1.0 };
+        let model = scenario.spec().model;
+        let Ok(plant) = Plant::new(&model) else { return plain };
+        let actuator = plant.actuator();
+        if actuator.kind() == ActuatorKind::Motor {
+            let volts = |torque: f64| torque / actuator.motor_gain();
+            let at_rest = volts(plant.friction().at_rest() * actuator.preload());
+            return Volts {
+                motion: volts(PAPER_PULL * model.inertia),
+                // A motor without friction has nothing to break away from.
+                friction: if at_rest > 0.0 { at_rest } else { 1.0 },
+            };
+        }
+        let hold = plant.holding_voltage_sliding();
+        Volts { motion: hold, friction: hold }
+    }
+
+    fn in_unit(&self, unit: Unit) -> f64 {
+        match unit {
+            Unit::Own => 1.0,
+            Unit::Motion => self.motion,
+            Unit::Friction => self.friction,
+        }
+    }
+}
+
+const GLIDE_GAINS: &[Gain] = &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)];
+const RIPPLE: (&str, Told) = ("law.glide.filter.ripple_share", Told::Ripple);
+const LAG: (&str, Told) = ("law.glide.filter.lag_s", Told::Lag);
+const DELAY: (&str, Told) = ("law.glide.filter.delay_ticks", Told::Delay);
 
 /// Key of the smoothing of (5).
 pub(crate) const SMOOTHING: &str = "velocity.smoothed_derivative.smoothing";
 const SMOOTHED: Gain = plain(SMOOTHING, 0.2, 1.0);
 
 /// Every law that is tried. Ends were chosen so that the sets of docs/smooth.md and docs/certified.md lie within.
-pub(crate) const FAMILIES: [Family; 5] = [
+pub(crate) const FAMILIES: [Family; 7] = [
+    Family { key: "glide", name: "glide", gains: GLIDE_GAINS, told: &[RIPPLE, LAG, DELAY], for_turns: false },
     Family {
         key: "glide",
-        name: "glide",
-        gains: &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)],
-        told: &[
-            ("law.glide.filter.ripple_share", Told::Ripple),
-            ("law.glide.filter.lag_s", Told::Lag),
-            ("law.glide.filter.delay_ticks", Told::Delay),
-        ],
+        name: "glide with micro-steps",
+        gains: GLIDE_GAINS,
+        told: &[RIPPLE, LAG, DELAY, ("law.glide.micro_below_deg_s", Told::Steps)],
+        for_turns: true,
     },
     Family {
         key: "pid",
@@ -77,8 +141,24 @@ pub(crate) const FAMILIES: [Family; 5] = [
             volts("law.pid.kd_v_s_rad", 1.5, 16.0),
             SMOOTHED,
         ],
-        told: &[("law.pid.bias_v", Told::Holding)],
+        told: &[
+            ("law.pid.bias_v", Told::Holding),
+            ("law.pid.coulomb_v", Told::Friction),
+            ("law.pid.velocity_v_s_rad", Told::Damping),
+            ("law.pid.acceleration_v_s2_rad", Told::Inertia),
+        ],
+        for_turns: false,
     },
+    family(
+        "dob",
+        "PD with observer",
+        &[
+            plain("law.dob.kp_1_s2", 3000.0, 16_000.0),
+            plain("law.dob.kd_1_s", 80.0, 500.0),
+            plain("law.dob.bandwidth_rad_s", 25.0, 200.0),
+            SMOOTHED,
+        ],
+    ),
     family(
         "pd",
         "PD",
@@ -88,7 +168,7 @@ pub(crate) const FAMILIES: [Family; 5] = [
         "smc",
         "SMC (31)",
         &[
-            volts("law.smc.kp_v", 1.2, 3.0),
+            Gain { key: "law.smc.kp_v", low: 1.2, high: 3.0, unit: Unit::Friction },
             volts("law.smc.kd_v_s_rad", 2.0, 180.0),
             plain("law.smc.slope_1_s", 30.0, 120.0),
             plain("law.smc.boundary_rad_s", 0.05, 0.4),
@@ -119,7 +199,25 @@ const BASES: [u32; 5] = [2, 3, 5, 7, 11];
 /// The gains of a candidate, by their keys.
 pub(crate) type Gains = Vec<(String, f64)>;
 
+/// Rate below which a shaft does not slide under an encoder of 20 000 counts, °/s: docs/smooth.md.
+const STEPS_BELOW: f64 = 0.95;
+
 impl Told {
+    /// A feed-forward of the believed shaft, as the law PID documents it; none that it has no key for.
+    fn volts(self, plant: &Plant<f64>) -> Option<f64> {
+        let (actuator, model) = (plant.actuator(), plant.params());
+        let motor = actuator.kind() == ActuatorKind::Motor;
+        let sliding = plant.friction().sliding();
+        let per_torque = if motor { actuator.motor_gain() } else { sliding * actuator.brake_gain() };
+        match self {
+            Told::Holding => Some(plant.holding_voltage_sliding()),
+            Told::Friction => motor.then(|| sliding * actuator.preload() / per_torque),
+            Told::Damping => Some(model.viscous_damping / per_torque),
+            Told::Inertia => Some(model.inertia / per_torque),
+            Told::Ripple | Told::Lag | Told::Delay | Told::Steps => None,
+        }
+    }
+
     /// Its value, as a key takes it; none where the rig has nothing to be told.
     fn value(self, base: &Scenario) -> Option<Value> {
         let rig = &base.params().rig;
@@ -127,7 +225,12 @@ impl Told {
             Told::Ripple => Value::Float(rig.ripple.as_ref().map_or(0.03, |ripple| ripple.rms.max(0.03))),
             Told::Lag => Value::Float(rig.actuator_time_constant?),
             Told::Delay => Value::Integer(rig.delay_ticks.min(3).into()),
-            Told::Holding => Value::Float(holding(base)),
+            Told::Steps => {
+                Value::Float(STEPS_BELOW * 20_000.0 / f64::from(rig.encoder.sensor.counts_per_rev))
+            }
+            Told::Holding | Told::Friction | Told::Damping | Told::Inertia => {
+                Value::Float(self.volts(&Plant::new(&base.spec().model).ok()?)?)
+            }
         })
     }
 }
@@ -143,15 +246,15 @@ impl Family {
         self.law().is_some_and(|law| law.sampled().is_some())
     }
 
-    /// Gains of candidate `n`; with `hold` the voltage that holds the sliding shaft, V. Candidate 0 has the scenario's own,
-    /// where the law is the scenario's, else the law's defaults.
-    pub(crate) fn gains(&self, n: u32, hold: f64) -> Gains {
+    /// Gains of candidate `n`, in these volts. Candidate 0 has the scenario's own, where the law is the scenario's, else the
+    /// law's defaults.
+    pub(crate) fn gains(&self, n: u32, volts: &Volts) -> Gains {
         if n == 0 {
             return Vec::new();
         }
         let drawn = |(gain, base): (&Gain, &u32)| {
-            let unit = if gain.volts { hold } else { 1.0 };
-            let value = unit * gain.low * (gain.high / gain.low).powf(van_der_corput(n, *base));
+            let value =
+                volts.in_unit(gain.unit) * gain.low * (gain.high / gain.low).powf(van_der_corput(n, *base));
             // Four digits: what is typed again is what was run.
             (gain.key.to_owned(), format!("{value:.3e}").parse().unwrap_or(value))
         };
@@ -180,11 +283,6 @@ impl Family {
         }
         Scenario::from_table(base.name(), table, &set)
     }
-}
-
-/// The voltage that holds the believed shaft while it slides, V.
-pub(crate) fn holding(scenario: &Scenario) -> f64 {
-    Plant::new(&scenario.spec().model).map_or(1.0, |plant| plant.holding_voltage_sliding())
 }
 
 /// The family of a scenario's law, if it is one of those that are tried.

@@ -9,13 +9,14 @@ pub use proof::ShellTried;
 pub use trial::Score;
 
 use clutch_certificate::Certificate;
+use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
 use clutch_identify::{Believed, Corner, RigFile, believed};
 use clutch_sim::progress::Report;
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Scenario, ScenarioError};
-use laws::{FAMILIES, Family, Gains, SMOOTHING, family_of, holding};
+use laws::{FAMILIES, Family, Gains, SMOOTHING, Volts, family_of};
 use proof::{Bounds, SHELLS, prove};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -24,7 +25,7 @@ use trial::{Trial, scores};
 /// The request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Rates at which gains are to be smooth, °/s; none: the scenario's own.
+    /// Rates at which gains are to be smooth, °/s; none: the scenario's own, or its own path where that is no ramp.
     pub rates_deg_s: Vec<f64>,
     /// Candidates of each law.
     pub candidates: u32,
@@ -49,7 +50,7 @@ const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
 const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
 const JUDGING: std::ops::RangeInclusive<u64> = 101..=108;
 const ACCEPTING: std::ops::RangeInclusive<u64> = 201..=210;
-/// Lengths of their runs, s.
+/// Lengths of their runs on a ramp, s; along another path they are as long as the scenario's.
 const SHORT_S: f64 = 2.0;
 const LONG_S: f64 = 4.0;
 const ACCEPT_S: f64 = 6.0;
@@ -126,7 +127,7 @@ pub struct Candidate {
 /// The outcome.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuned {
-    /// Rates, °/s, the lowest first.
+    /// Rates of the ramp, °/s, the lowest first; none where the scenario's path is no ramp.
     pub rates_deg_s: Vec<f64>,
     /// Corners of the bounds.
     pub corners: Vec<Corner>,
@@ -134,8 +135,10 @@ pub struct Tuned {
     pub candidates: Vec<Candidate>,
     /// Number of the one that is chosen.
     pub chosen: Option<usize>,
-    /// Its score from rest, at the lowest rate.
+    /// Its score from rest, at the lowest rate, or along the path.
     pub from_rest: Option<Score>,
+    /// Reason why no law can be certified here, where there is one: of a motor, of a path that is no ramp, of a lag.
+    pub uncovered: Option<String>,
     /// Shells that were tried and not proven, with what limits.
     pub open_shells: Vec<(ShellTried, String)>,
     /// Simulated time, s.
@@ -156,12 +159,14 @@ impl Tuned {
     }
 }
 
-/// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified.
-/// `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes again, on any
-/// number of cores. `report` gets each run.
+/// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified:
+/// at rates of a ramp, or along the scenario's path where that is no ramp. Motors and paths that are no ramps have no
+/// certificate yet. `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes
+/// again, on any number of cores. `report` gets each run.
 ///
 /// # Errors
-/// A path that is no ramp, a rig without a brake, an option out of range; the end of `report`'s patience.
+/// A rig with brake and motor on one signal, rates for a path that is no ramp, an option out of range; the end of `report`'s
+/// patience.
 pub fn tune(
     scenario: &Scenario,
     file: Option<&RigFile>,
@@ -170,9 +175,13 @@ pub fn tune(
 ) -> Result<Tuned, ScenarioError> {
     let rates_deg_s = rates(scenario, options)?;
     let Believed { scenario: base, delay_between, corners } = believed(scenario, file)?;
-    let set = [(RATE.to_owned(), Value::Float(rates_deg_s[0]))];
-    let base = Scenario::from_table(base.name(), base.table().clone(), &set)?;
-    let job = Job { base, rates_deg_s, corners, delay_between, options, report };
+    let lowest = rates_deg_s.first().map(|rate| (RATE.to_owned(), Value::Float(*rate)));
+    let base = Scenario::from_table(base.name(), base.table().clone(), lowest.as_slice())?;
+    let uncovered = match delay_between {
+        Some(why) => Some(why),
+        None => uncovered(&base)?,
+    };
+    let job = Job { base, rates_deg_s, corners, uncovered, options, report };
     // A shell holds with any law within: it is looked for meanwhile.
     let (candidates, shells) = rayon::join(|| job.candidates(), || job.shells());
     let (mut candidates, shells) = (candidates?, shells?);
@@ -181,19 +190,24 @@ pub fn tune(
     job.choose(candidates, shells)
 }
 
-/// The rates, checked, the lowest first.
+/// The rates, checked, the lowest first; none where the path is no ramp.
 fn rates(scenario: &Scenario, options: &Options) -> Result<Vec<f64>, ScenarioError> {
     let wrong = |key: &str, value: &str, expected: &str| {
         Err(ScenarioError::value(scenario.name(), key, value, expected))
     };
-    let ReferenceParams::Ramp(ramp) = scenario.params().reference else {
-        return wrong("reference", "another path", "a ramp, [reference.ramp]: gains are tuned for a rate");
-    };
-    let mut rates = if options.rates_deg_s.is_empty() {
-        vec![ramp.rate.to_degrees()]
-    } else {
-        options.rates_deg_s.clone()
-    };
+    let mut rates = options.rates_deg_s.clone();
+    match &scenario.params().reference {
+        ReferenceParams::Ramp(ramp) if rates.is_empty() => rates.push(ramp.rate.to_degrees()),
+        ReferenceParams::Ramp(_) => {}
+        path if !rates.is_empty() => {
+            let expected = format!(
+                "none, as [reference.{}] has velocities of its own, or a path at a rate, [reference.ramp]",
+                Choice::<f64>::name(path)
+            );
+            return wrong("rates", &options.rates_deg_s[0].to_string(), &expected);
+        }
+        _ => {}
+    }
     if let Some(bad) = rates.iter().find(|rate| !(rate.is_finite() && **rate > 0.0)) {
         return wrong("rates", &bad.to_string(), "finite numbers above 0 °/s");
     }
@@ -229,13 +243,10 @@ struct Job<'a> {
     base: Scenario,
     rates_deg_s: Vec<f64>,
     corners: Vec<Corner>,
-    delay_between: Option<String>,
+    uncovered: Option<String>,
     options: &'a Options,
     report: Report<'a>,
 }
-
-/// The rig as it is believed to be.
-const BELIEVED: [Corner; 1] = [Corner { pull: 1.0, hold: 1.0 }];
 
 impl Job<'_> {
     fn scores(
@@ -251,15 +262,21 @@ impl Job<'_> {
 
     /// The best gains of each law: sorted out on the believed rig, chosen on the corners.
     fn candidates(&self) -> Result<Vec<Finalist>, ScenarioError> {
-        let hold = holding(&self.base);
+        let volts = Volts::of(&self.base);
         let own = family_of(&self.base.params().law);
-        let order = own.into_iter().chain(FAMILIES.iter().filter(|f| own.is_none_or(|own| own.key != f.key)));
-        order.map(|family| self.best_of(family, hold)).collect()
+        let others = FAMILIES.iter().filter(|f| own.is_none_or(|own| own.name != f.name));
+        let order = own.into_iter().chain(others).filter(|f| !(f.for_turns && self.on_a_ramp()));
+        order.map(|family| self.best_of(family, &volts)).collect()
     }
 
-    fn best_of(&self, family: &'static Family, hold: f64) -> Result<Finalist, ScenarioError> {
+    /// `false` along a path that may rest and turn round.
+    fn on_a_ramp(&self) -> bool {
+        !self.rates_deg_s.is_empty()
+    }
+
+    fn best_of(&self, family: &'static Family, volts: &Volts) -> Result<Finalist, ScenarioError> {
         let all = (0..self.options.candidates).map(|n| {
-            let gains = family.gains(n, hold);
+            let gains = family.gains(n, volts);
             Ok((family.scenario(&self.base, &gains)?, gains))
         });
         let all = all.collect::<Result<Vec<_>, ScenarioError>>()?;
@@ -277,7 +294,7 @@ impl Job<'_> {
         if stable.is_empty() {
             return Ok(nothing);
         }
-        let first = self.scores(&refs(&stable), &BELIEVED, FIRST, SHORT_S)?;
+        let first = self.scores(&refs(&stable), &[Corner::BELIEVED], FIRST, SHORT_S)?;
         let mut kept: Vec<(f64, (Scenario, Gains))> = first.iter().map(Score::order).zip(stable).collect();
         kept.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable: ties stay in order
         kept.truncate(KEPT);
@@ -294,12 +311,8 @@ impl Job<'_> {
     /// The first shell that is proven.
     fn shells(&self) -> Result<Shells, ScenarioError> {
         let mut shells = Shells { proven: None, open: Vec::new() };
-        if let Some(why) = &self.delay_between {
-            shells.open.extend(SHELLS.first().map(|shell| (*shell, why.clone())));
-            return Ok(shells);
-        }
-        let Some(inner) = FAMILIES.iter().find(|family| !family.certified_alone()) else { return Ok(shells) };
-        let inner = inner.scenario(&self.base, &Gains::new())?;
+        let inner = any_inner(&self.base)?;
+        let Some(inner) = inner.filter(|_| self.uncovered.is_none()) else { return Ok(shells) };
         let one = |shell: &ShellTried| {
             let within = within(&inner, shell)?;
             match edge_trips(&within, shell) {
@@ -348,7 +361,7 @@ impl Job<'_> {
 
     /// The proof of a candidate.
     fn proven(&self, scenario: &Scenario, shells: &Shells) -> Result<Result<Bounds, String>, ScenarioError> {
-        if let Some(why) = &self.delay_between {
+        if let Some(why) = &self.uncovered {
             return Ok(Err(why.clone()));
         }
         if let Some((_, bounds)) = shells.proven.as_ref().filter(|_| scenario.params().shell.boundary > 0.0)
@@ -368,6 +381,7 @@ impl Job<'_> {
             candidates: all.into_iter().map(Finalist::told).collect(),
             chosen: None,
             from_rest: None,
+            uncovered: self.uncovered.clone(),
             open_shells: shells.open.clone(),
             certificate: None,
             believed: self.base.clone(),
@@ -378,7 +392,7 @@ impl Job<'_> {
                 continue;
             };
             let Score { runs_with_sticks, runs, .. } = candidate.score;
-            if runs_with_sticks > 0 {
+            if runs_with_sticks > 0 && self.on_a_ramp() {
                 // It would be refused from rest, too, behind a proof that takes its time.
                 let why = format!(
                     "it sticks in {runs_with_sticks} of {runs} runs on discs that it was not chosen on"
@@ -420,11 +434,11 @@ impl Job<'_> {
         Ok(tuned)
     }
 
-    /// Lets a candidate start from rest at the lowest rate, on discs of its own: it has to slide once it has settled, and to
-    /// stay within what is proven of it.
+    /// Lets a candidate start from rest at the lowest rate, or along the path, on discs of its own: on a ramp it has to slide
+    /// once it has settled, and everywhere to stay within what is proven of it.
     fn accept(&self, n: usize, scenario: &Scenario, tuned: &mut Tuned) -> Result<bool, ScenarioError> {
         let trial = Trial {
-            rates_deg_s: &self.rates_deg_s[..1],
+            rates_deg_s: self.rates_deg_s.get(..1).unwrap_or_default(),
             corners: &self.corners,
             discs: ACCEPTING,
             seconds: ACCEPT_S,
@@ -438,11 +452,8 @@ impl Job<'_> {
         };
         let why = if score.cost.is_none() {
             "from rest it leaves its path".to_owned()
-        } else if score.runs_with_sticks > 0 {
-            format!(
-                "from rest at {} °/s it sticks in {} of {} runs",
-                self.rates_deg_s[0], score.runs_with_sticks, score.runs
-            )
+        } else if let (Some(rate), true) = (self.rates_deg_s.first(), score.runs_with_sticks > 0) {
+            format!("from rest at {rate} °/s it sticks in {} of {} runs", score.runs_with_sticks, score.runs)
         } else if !within {
             "its error exceeds what is proven: please report this as a defect".to_owned()
         } else {
@@ -491,6 +502,20 @@ fn refs(of: &[(Scenario, Gains)]) -> Vec<&Scenario> {
 /// The spectral radius decides where it is known, with every brake of the bounds; where it is not, trials do.
 fn is_stable(scenario: &Scenario) -> bool {
     scenario.plan().is_ok_and(|plan| scenario.sampled(&plan.bounds).stable() != Some(false))
+}
+
+/// The scenario with a law that stands in a shell, whichever it is.
+fn any_inner(base: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
+    let inner = FAMILIES.iter().find(|family| !family.certified_alone());
+    inner.map(|family| family.scenario(base, &Gains::new())).transpose()
+}
+
+/// Reason why no law is certified on such a rig and path: a shell asks nothing of the law within, and what a shell is not certified
+/// for, no law is.
+fn uncovered(base: &Scenario) -> Result<Option<String>, ScenarioError> {
+    let Some(inner) = any_inner(base)? else { return Ok(None) };
+    let within = within(&inner, &SHELLS[0])?;
+    Ok(within.sampled_setup(&within.plan()?.bounds).err().map(|why| why.to_string()))
 }
 
 /// A scenario's law in a shell.

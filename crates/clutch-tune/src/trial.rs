@@ -2,7 +2,6 @@
 
 use clutch_core::reference::ReferenceParams;
 use clutch_identify::Corner;
-use clutch_sim::drive::DriveParams;
 use clutch_sim::progress::{Progress, Report};
 use clutch_sim::run::{RunError, simulate_watched};
 use clutch_sim::scenario::ScalarKind;
@@ -13,11 +12,12 @@ use serde::Serialize;
 /// Rigs and discs of a trial.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial<'a> {
+    /// Rates of the ramp; none: the scenario's own path, as long as its run, behind its settling time.
     pub(crate) rates_deg_s: &'a [f64],
     pub(crate) corners: &'a [Corner],
     /// Seeds of the discs.
     pub(crate) discs: std::ops::RangeInclusive<u64>,
-    /// Length of each run, s, of which the settling time does not count.
+    /// Length of each run on a ramp, s, of which the settling time does not count.
     pub(crate) seconds: f64,
 }
 
@@ -29,12 +29,14 @@ const FAR: f64 = 0.5;
 const PER_DEGREE: f64 = 30.0;
 /// Weight of the longest stick, cycles/s per second.
 const PER_SECOND: f64 = 50.0;
+/// Weight of the largest error along a path that is no ramp, per degree.
+const PER_DEGREE_AT_MOST: f64 = 10.0;
 
 /// The worst run of a trial. All figures but [`Score::cost`] are the largest of all runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// Cycles/s + 30 × RMS error in degrees + longest stick over 20 ms, of the run where this sum is largest; none if a run
-    /// left its path.
+    /// On a ramp cycles/s + 30 × RMS error in degrees + longest stick over 20 ms; along another path, which may rest and turn
+    /// round, 30 × RMS error + 10 × largest error in degrees. Of the run where this sum is largest; none if a run left its path.
     pub cost: Option<f64>,
     /// Stick-slip cycles a second.
     pub cycles_per_s: f64,
@@ -44,6 +46,8 @@ pub struct Score {
     pub max_error_rad: f64,
     /// Longest stick, s.
     pub longest_stick_s: f64,
+    /// Total variation of the voltage, per time, V/s.
+    pub control_variation_v_s: f64,
     /// Runs.
     pub runs: u32,
     /// Runs in which the shaft stuck.
@@ -66,6 +70,7 @@ impl Score {
             rms_error_rad: self.rms_error_rad.max(other.rms_error_rad),
             max_error_rad: self.max_error_rad.max(other.max_error_rad),
             longest_stick_s: self.longest_stick_s.max(other.longest_stick_s),
+            control_variation_v_s: self.control_variation_v_s.max(other.control_variation_v_s),
             runs: self.runs + other.runs,
             runs_with_sticks: self.runs_with_sticks + other.runs_with_sticks,
             simulated_s: self.simulated_s + other.simulated_s,
@@ -79,17 +84,21 @@ pub(crate) fn scores(
     trial: &Trial<'_>,
     report: Report<'_>,
 ) -> Result<Vec<Score>, ScenarioError> {
+    let rates: Vec<Option<f64>> = match trial.rates_deg_s {
+        [] => vec![None],
+        rates => rates.iter().copied().map(Some).collect(),
+    };
     let mut runs = Vec::new();
     for (n, candidate) in candidates.iter().enumerate() {
         for corner in trial.corners {
-            for rate in trial.rates_deg_s {
+            for rate in &rates {
                 runs.extend(trial.discs.clone().map(|disc| (n, *candidate, *corner, *rate, disc)));
             }
         }
     }
     let total = runs.len() as u64;
     let _ = report(Progress { total, finished: 0 });
-    let one = |(n, candidate, corner, rate, disc): (usize, &Scenario, Corner, f64, u64)| {
+    let one = |(n, candidate, corner, rate, disc): (usize, &Scenario, Corner, Option<f64>, u64)| {
         let score = run(candidate, corner, rate, disc, trial.seconds, report)?;
         let _ = report(Progress { total, finished: 1 });
         Ok::<_, ScenarioError>((n, score))
@@ -103,30 +112,28 @@ pub(crate) fn scores(
     Ok(scores)
 }
 
-/// One run: the corner scales torque and inertia, and with them both ratios that motion depends on.
+/// One run, at a rate of the ramp or along the scenario's path.
 fn run(
     candidate: &Scenario,
     corner: Corner,
-    rate_deg_s: f64,
+    rate_deg_s: Option<f64>,
     disc: u64,
     seconds: f64,
     report: Report<'_>,
 ) -> Result<Score, ScenarioError> {
     let mut spec = candidate.spec();
-    if let DriveParams::Weight(weight) = &mut spec.rig.drive {
-        weight.mass *= corner.hold;
-    }
-    spec.rig.inertia *= corner.hold / corner.pull;
-    spec.rig.viscous_damping *= corner.hold / corner.pull;
-    spec.reference = ReferenceParams::ramp(rate_deg_s.to_radians());
+    corner.apply(&mut spec.rig);
     spec.run.seed = disc;
-    (spec.run.duration, spec.run.settle) = (seconds, SETTLE_S);
+    if let Some(rate) = rate_deg_s {
+        spec.reference = ReferenceParams::ramp(rate.to_radians());
+        (spec.run.duration, spec.run.settle) = (seconds, SETTLE_S);
+    }
     let watch = |_: Progress| report(Progress { total: 0, finished: 0 });
     let run = match candidate.scalar() {
         ScalarKind::F32 => simulate_watched::<f32>(&spec, Keep::Figures, &watch),
         ScalarKind::F64 => simulate_watched::<f64>(&spec, Keep::Figures, &watch),
     };
-    let own = Score { runs: 1, simulated_s: seconds, ..Score::default() };
+    let own = Score { runs: 1, simulated_s: spec.run.duration, ..Score::default() };
     let m = match run {
         Ok(run) => run.metrics,
         // Gains may drive a shaft so far that no engine follows.
@@ -134,7 +141,12 @@ fn run(
         Err(e) => return Err(candidate.run_error(&e)),
     };
     let longest = m.longest_stick_s.unwrap_or(0.0);
-    let cost = m.stick_slip_cycles_per_s + PER_DEGREE * m.rms_error_rad.to_degrees() + PER_SECOND * longest;
+    let roughness = match rate_deg_s {
+        Some(_) => m.stick_slip_cycles_per_s + PER_SECOND * longest,
+        // Where a path turns round every shaft rests: the error alone tells what that costs.
+        None => PER_DEGREE_AT_MOST * m.max_error_rad.to_degrees(),
+    };
+    let cost = roughness + PER_DEGREE * m.rms_error_rad.to_degrees();
     let follows = m.max_error_rad < FAR && cost.is_finite();
     Ok(Score {
         cost: follows.then_some(cost),
@@ -142,6 +154,7 @@ fn run(
         rms_error_rad: m.rms_error_rad,
         max_error_rad: m.max_error_rad,
         longest_stick_s: longest,
+        control_variation_v_s: m.control_variation_v_s,
         runs_with_sticks: u32::from(m.stick_time_fraction > 0.0),
         ..own
     })

@@ -28,7 +28,7 @@ fn sum(a: &Linear, factor: Interval, b: &Linear) -> Linear {
 
 /// The law's pieces, in the order of their numbers.
 pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Piece>, String> {
-    let [low, high] = setup.volts.map(at);
+    let [low, high] = shaft.ends(setup.volts);
     let per = shaft.kappa * shaft.speed;
     let rate = [per, -per, at(0.0), at(0.0)];
     let error = [shaft.count, at(0.0), at(0.0), at(0.0)];
@@ -39,21 +39,23 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
             if !cell.strips.is_empty() {
                 return Err("PD has none".into());
             }
-            let demand = sum(&sum(&fixed(at(forward)), at(-kp), &error), at(-kd), &rate);
+            let demand = sum(&sum(&fixed(shaft.counted(forward)), at(-kp), &error), at(-kd), &rate);
             Ok(limited(&demand, [low, high], off))
         }
         Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
             if !cell.strips.is_empty() {
                 return Err("PID has none".into());
             }
+            let forward = shaft.counted(forward);
             let kept = [at(0.0), at(0.0), at(0.0), at(1.0)];
             let integral = sum(&kept, -(at(ki) * at(setup.period_s)), &error);
             let demand =
-                sum(&sum(&sum(&fixed(at(forward)), at(1.0), &integral), at(-kp), &error), at(-kd), &rate);
+                sum(&sum(&sum(&fixed(forward), at(1.0), &integral), at(-kp), &error), at(-kd), &rate);
             let follows = at(setup.period_s) / at(tracking);
-            let ends = limits.map(|limit| at(limit) - at(forward));
+            let limits = shaft.ends(limits);
+            let ends = limits.map(|limit| limit - forward);
             // A limit of the law may lie beyond the converter's end.
-            let apart = (at(limits[0]) - low).abs().max((at(limits[1]) - high).abs());
+            let apart = (limits[0] - low).abs().max((limits[1] - high).abs());
             let rounding = fixed((at(MEMORY_ROUNDING) + follows * apart).most());
             Ok(remembering(
                 limited(&demand, [low, high], off),

@@ -155,11 +155,14 @@ impl Mode {
         out.constant = ce * step;
         match self.case {
             Case::Slides | Case::LetGo => {
-                let (least, most) =
-                    if self.case == Case::Slides { shaft.brakes } else { shaft.brakes_anywhere };
+                let ((least, most), drives) = if self.case == Case::Slides {
+                    (shaft.brakes, shaft.drives)
+                } else {
+                    (shaft.brakes_anywhere, shaft.drives_anywhere)
+                };
                 let (above, below) = integrals(cs + ce, cs);
                 out.weights[S] = ce + cs;
-                out.constant = out.constant + below * shaft.drives.1 - above * shaft.drives.0;
+                out.constant = out.constant + below * drives.1 - above * drives.0;
                 volts(&mut out, above * most - below * least, &self.applied);
             }
             Case::TouchesAndLeaves | Case::TouchesAndStays => {
@@ -170,7 +173,7 @@ impl Mode {
                 if self.case == Case::TouchesAndLeaves {
                     let up = slows + at(0.5) * gains;
                     // A hair more than 0 where the voltage just holds.
-                    out.constant = out.constant + up * (shaft.drives.1 + at(1e-12));
+                    out.constant = out.constant + up * (shaft.drives_anywhere.1 + at(1e-12));
                     volts(&mut out, -(up * shaft.brakes_leaving), &self.applied);
                 }
             }

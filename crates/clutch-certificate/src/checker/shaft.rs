@@ -22,8 +22,10 @@ pub(crate) struct Shaft {
     pub(crate) speed: Interval,
     /// The path's velocity.
     pub(crate) path: Interval,
-    /// Least and most acceleration without the brake.
+    /// Least and most acceleration at 0 V, above Stribeck's speeds.
     pub(crate) drives: (Interval, Interval),
+    /// Least and most acceleration at 0 V, at any speed.
+    pub(crate) drives_anywhere: (Interval, Interval),
     /// Least and most braking per volt, above Stribeck's speeds.
     pub(crate) brakes: (Interval, Interval),
     /// Least and most braking per volt, at any speed.
@@ -41,9 +43,50 @@ pub(crate) struct Shaft {
     /// `K_Kal`.
     pub(crate) kappa: Interval,
     pub(crate) delay: usize,
+    /// The voltage from which those of a motor are counted downwards; none of a brake.
+    counted_from: Option<f64>,
     /// Most by which a shaft departs from the line through its samples.
     pub(crate) bend: f64,
     cap: f64,
+}
+
+/// The part of [`Shaft`] that brakes and motors have each in their way.
+struct Shape {
+    drives: (Interval, Interval),
+    drives_anywhere: (Interval, Interval),
+    brakes: (Interval, Interval),
+    brakes_anywhere: (Interval, Interval),
+    brakes_leaving: Interval,
+    lets_go: f64,
+    stays: f64,
+    most_slowing: Interval,
+}
+
+/// A motor whose volts are counted downwards from `top`, over a `range`.
+struct Turned {
+    gain: Interval,
+    torque: Interval,
+    /// Counts per tick² of a torque.
+    per: Interval,
+    top: Interval,
+    range: Interval,
+}
+
+impl Turned {
+    /// All accelerations at so many volts of its own.
+    fn at(&self, volts: Interval, friction: Interval) -> Interval {
+        (self.gain * volts + self.torque - friction) * self.per
+    }
+
+    /// Least and most acceleration at the top, and braking per volt counted from there. The most that a shaft may accelerate is
+    /// convex in the voltage, whatever torque per volt, load, inertia and friction are, and the least concave: the lines from end to
+    /// end lie outside.
+    fn lines(&self, friction: Interval) -> ((Interval, Interval), (Interval, Interval)) {
+        let (first, last) = (self.at(self.top, friction), self.at(self.top - self.range, friction));
+        let per_volt = |first: f64, last: f64| (at(first) - at(last)) / self.range;
+        let brakes = (per_volt(first.high, last.high).least(), per_volt(first.low, last.low).most());
+        ((first.least(), first.most()), brakes)
+    }
 }
 
 impl Shaft {
@@ -58,7 +101,6 @@ impl Shaft {
         let inertia = (at(s.inertia[0]), at(s.inertia[1]));
         let noise = at(s.torque_noise);
         let (weakest_drive, strongest_drive) = (at(s.drive_torque[0]) - noise, at(s.drive_torque[1]) + noise);
-        let most_drive = (strongest_drive / inertia.0 * scale).most();
 
         // Stribeck's speeds end at this exponent of the curve: any speed would do, as long as what is left is bounded there.
         let exponent = at(libm::pow(s.slow_exponent(), 1.0 / s.stribeck[1]));
@@ -70,42 +112,100 @@ impl Shaft {
         let least_rest =
             if s.rest_not_below_sliding { s.at_rest[0].max(cell.sliding[0]) } else { s.at_rest[0] };
         let rest = (at(least_rest), at(s.at_rest[1].max(least_rest)));
-        let weak = (at(1.0) - at(s.ripple)) * at(s.brake_gain[0]);
-        let strong = (at(1.0) + at(s.ripple)) * at(s.brake_gain[1]);
         let least_fast = sliding.0 + left * (rest.0 - sliding.0).min(at(0.0));
         let most_fast = sliding.1 + left * (rest.1 - sliding.0).positive();
-        let least_held = (rest.0.min(sliding.0) * weak).least();
-        let most_held = (rest.1.max(sliding.1) * strong).most();
 
-        let drag = at(s.viscous_damping[1]) / inertia.0 * period * (at(cell.speed_cap) + most_drive);
-        let brakes_anywhere =
-            ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
-        let least_drive = (weakest_drive / inertia.1 * scale - drag).least();
         let volts_off = (at(0.5) * at(s.converter_step) + at(LAW_ROUNDING)).most();
-        // With a delay the first ticks have what the brake had before.
-        let before = if s.delay_ticks > 0 { s.start_volts[1] } else { 0.0 };
-        let most_volts = (at(s.volts[1]) + volts_off).max(at(before));
-        let most_slowing = brakes_anywhere.1 * most_volts - least_drive;
-        Shaft {
+        let common = |shape: Shape| Shaft {
             count,
             speed,
             path: at(s.rate) / speed,
+            drives: shape.drives,
+            drives_anywhere: shape.drives_anywhere,
+            brakes: shape.brakes,
+            brakes_anywhere: shape.brakes_anywhere,
+            brakes_leaving: shape.brakes_leaving,
+            lets_go: shape.lets_go.max(0.0),
+            stays: shape.stays,
+            slow: slow_si / speed,
+            volts_off,
+            kappa: at(s.smoothing),
+            delay: s.delay_ticks as usize,
+            counted_from: s.motor.map(|_| s.counted_from()),
+            bend: (shape.drives.1.max(shape.drives_anywhere.1).max(shape.most_slowing) / at(8.0)).high,
+            cap: cell.speed_cap,
+        };
+        // Drag of a shaft that has sped up all the tick.
+        let drag = |most_drive: Interval| {
+            at(s.viscous_damping[1]) / inertia.0 * period * (at(cell.speed_cap) + most_drive)
+        };
+        if let Some(motor) = &s.motor {
+            let ripple = Interval { low: 1.0 - s.ripple, high: 1.0 + s.ripple }.widened(LIBRARY);
+            let normal = ripple * at(motor.preload);
+            let friction =
+                |least: Interval, most: Interval| Interval { low: least.low, high: most.high } * normal;
+            let fast = friction(least_fast, most_fast);
+            let held = friction(rest.0.min(sliding.0), rest.1.max(sliding.1));
+            let turn = Turned {
+                gain: Interval { low: motor.gain[0], high: motor.gain[1] },
+                torque: Interval { low: weakest_drive.low, high: strongest_drive.high },
+                per: scale / Interval { low: s.inertia[0], high: s.inertia[1] },
+                top: at(s.counted_from()),
+                range: (at(s.counted_from()) - (at(s.volts[0]) - volts_off).min(at(s.start_volts[0]))).most(),
+            };
+            let ((least, most), brakes) = turn.lines(fast);
+            let ((least_anywhere, most_anywhere), brakes_anywhere) = turn.lines(held);
+            let drag = drag(most.max(most_anywhere).positive());
+            // Volts at which a shaft that friction holds just goes, and just stays.
+            let goes = (held + at(s.viscous_damping[1]) * slow_si - turn.torque) / turn.gain;
+            let stays = (held - turn.torque) / turn.gain;
+            let drives_anywhere = ((least_anywhere - drag).least(), most_anywhere);
+            return common(Shape {
+                drives: ((least - drag).least(), most),
+                drives_anywhere,
+                brakes,
+                brakes_anywhere,
+                brakes_leaving: (at(turn.gain.low) / inertia.0 * scale).least(),
+                lets_go: (turn.top - goes).low,
+                stays: (turn.top - stays).high,
+                most_slowing: brakes_anywhere.1 * turn.range - drives_anywhere.0,
+            });
+        }
+        let weak = (at(1.0) - at(s.ripple)) * at(s.brake_gain[0]);
+        let strong = (at(1.0) + at(s.ripple)) * at(s.brake_gain[1]);
+        let least_held = (rest.0.min(sliding.0) * weak).least();
+        let most_held = (rest.1.max(sliding.1) * strong).most();
+        let brakes_anywhere =
+            ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
+        let most_drive = (strongest_drive / inertia.0 * scale).most();
+        let least_drive = (weakest_drive / inertia.1 * scale - drag(most_drive)).least();
+        // With a delay the first ticks have what the brake had before.
+        let before = if s.delay_ticks > 0 { s.start_volts[1] } else { 0.0 };
+        let most_volts = (at(s.volts[1]) + volts_off).max(at(before));
+        common(Shape {
             drives: (least_drive, most_drive),
+            drives_anywhere: (least_drive, most_drive),
             brakes: (
                 (least_fast * weak / inertia.1 * scale).least(),
                 (most_fast * strong / inertia.0 * scale).most(),
             ),
             brakes_anywhere,
             brakes_leaving: (least_held / inertia.0 * scale).least(),
-            lets_go: ((weakest_drive - at(s.viscous_damping[1]) * slow_si) / most_held).low.max(0.0),
+            lets_go: ((weakest_drive - at(s.viscous_damping[1]) * slow_si) / most_held).low,
             stays: (strongest_drive / least_held).high,
-            slow: slow_si / speed,
-            volts_off,
-            kappa: at(s.smoothing),
-            delay: s.delay_ticks as usize,
-            bend: (most_drive.max(most_slowing) / at(8.0)).high,
-            cap: cell.speed_cap,
-        }
+            most_slowing: brakes_anywhere.1 * most_volts - least_drive,
+        })
+    }
+
+    /// A voltage as the set counts it.
+    pub(crate) fn counted(&self, volts: f64) -> Interval {
+        self.counted_from.map_or(at(volts), |from| at(from) - at(volts))
+    }
+
+    /// Two voltages as the set counts them, the lower first.
+    pub(crate) fn ends(&self, [low, high]: [f64; 2]) -> [Interval; 2] {
+        let (low, high) = (self.counted(low), self.counted(high));
+        if self.counted_from.is_some() { [high, low] } else { [low, high] }
     }
 
     /// Most counts that go by from one sample to the next.

@@ -7,15 +7,15 @@ use clutch_core::law::{Command, ControlLaw, Limit, Tick};
 pub(crate) enum Way {
     /// Any voltage in each period.
     Random,
-    /// None ever.
+    /// The lowest ever.
     Nothing,
     /// The highest always.
     Full,
-    /// None, the highest or any, for a random time each.
+    /// The lowest, the highest or any, for a random time each.
     Holds,
-    /// Away from the surface: full where the shaft is behind, none where it is ahead.
+    /// Away from the surface: slowest where the shaft is behind, fastest where it is ahead.
     AwayFromSurface,
-    /// Pumps by the rate: full where it falls behind, none where it gains.
+    /// Pumps by the rate: slowest where it falls behind, fastest where it gains.
     WithRate,
     /// Pumps by the error.
     WithError,
@@ -41,8 +41,11 @@ pub(crate) struct Adversary {
     pub(crate) way: Way,
     /// Seed of what it does at random.
     pub(crate) seed: u64,
-    /// Its highest voltage, V.
+    /// Its lowest and highest voltage, V.
+    pub(crate) lowest: f64,
     pub(crate) highest: f64,
+    /// A higher voltage drives, and does not brake.
+    pub(crate) motor: bool,
     /// Slope of the shell's surface, 1/s.
     pub(crate) slope: f64,
 }
@@ -66,14 +69,18 @@ impl Adversary {
         ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    fn any(&self, memory: &mut Memory) -> f64 {
+        self.lowest + (self.highest - self.lowest) * self.draw(memory)
+    }
+
     fn hold(&self, memory: &mut Memory) -> f64 {
         if memory.left == 0 {
             memory.left = 1 + (60.0 * self.draw(memory) * self.draw(memory)) as u32;
             let which = self.draw(memory);
             memory.volts = match which {
-                w if w < 0.35 => 0.0,
+                w if w < 0.35 => self.lowest,
                 w if w < 0.7 => self.highest,
-                _ => self.highest * self.draw(memory),
+                _ => self.any(memory),
             };
         }
         memory.left -= 1;
@@ -91,15 +98,15 @@ impl ControlLaw<f64> for Adversary {
     }
 
     fn update(&self, memory: &mut Memory, tick: &Tick<f64>) -> Command<f64, [f64; 0]> {
-        let full_if = |condition: bool| if condition { self.highest } else { 0.0 };
+        let slow_if = |behind: bool| if behind != self.motor { self.highest } else { self.lowest };
         let voltage = match self.way {
-            Way::Random => self.highest * self.draw(memory),
-            Way::Nothing => 0.0,
+            Way::Random => self.any(memory),
+            Way::Nothing => self.lowest,
             Way::Full => self.highest,
             Way::Holds => self.hold(memory),
-            Way::AwayFromSurface => full_if(self.slope * tick.error + tick.error_rate > 0.0),
-            Way::WithRate => full_if(tick.error_rate > 0.0),
-            Way::WithError => full_if(tick.error > 0.0),
+            Way::AwayFromSurface => slow_if(self.slope * tick.error + tick.error_rate > 0.0),
+            Way::WithRate => slow_if(tick.error_rate > 0.0),
+            Way::WithError => slow_if(tick.error > 0.0),
         };
         Command { voltage, limit: Limit::None, terms: [] }
     }

@@ -6,16 +6,16 @@
 //! ```
 //!
 //! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box; `integral`
-//! does so for PI, `shell` for shells, with laws within that do their worst. `campaign` draws sets and shells, too, with
-//! tolerances, ripple and noise, and counts broken bounds; `campaign-integral` draws PI alone. They begin at a seed, so that
-//! shares of them can run beside each other.
+//! does so for PI, `shell` for shells, with laws within that do their worst, `motor` for motor axes. `campaign` draws sets and
+//! shells, too, with tolerances, ripple and noise, and counts broken bounds; `campaign-integral` draws PI alone, `campaign-motor`
+//! motor axes. They begin at a seed, so that shares of them can run beside each other.
 
 mod adversary;
 
 use adversary::{Adversary, Way};
 use clutch_certificate::{Options, Setup, checker, largest, search};
 use clutch_core::friction::{FrictionParams, StribeckParams};
-use clutch_core::{PlantParams, Servo};
+use clutch_core::{BrakeActuator, MotorActuator, PlantParams, Servo};
 use clutch_sim::drive::DriveParams;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, RigParams, Scenario, simulate_servo};
@@ -32,6 +32,9 @@ enum Gains {
     Pid(f64, f64, f64, f64),
     Smc(f64, f64, f64, f64, f64),
     Shell(f64, f64, f64),
+    /// The same on a motor axis: with feed-forward of its friction, V, and an integral.
+    MotorPid([f64; 3], f64, f64),
+    MotorShell(f64, f64, f64),
 }
 
 /// PD: K_p, K_d, K_Kal. PID: K_p, K_i, K_d, K_Kal. SMC: K_p, K_d, f, ε, K_Kal. Shell: f, S, K_Kal.
@@ -63,6 +66,8 @@ impl Gains {
             Gains::Pid(kp, ki, kd, kappa) => format!("{kp}/{ki}/{kd}/{kappa}"),
             Gains::Smc(kp, kd, f, eps, kappa) => format!("SMC {kp}/{kd}/{f}/{eps}/{kappa}"),
             Gains::Shell(f, s, kappa) => format!("{f}/{s}/{kappa}"),
+            Gains::MotorPid([kp, ki, kd], kappa, ahead) => format!("PID {kp}/{ki}/{kd}/{kappa}, {ahead} V"),
+            Gains::MotorShell(f, s, kappa) => format!("shell {f}/{s}/{kappa}"),
         }
     }
 
@@ -97,8 +102,35 @@ impl Gains {
             Gains::Shell(f, s, kappa) => {
                 ("pd_2", vec![key("shell.slope_1_s", f), key("shell.boundary_rad_s", s), smoothing(kappa)])
             }
+            Gains::MotorPid([kp, ki, kd], kappa, ahead) => {
+                let law = [
+                    key("law.pid.kp_v_rad", kp),
+                    key("law.pid.ki_v_rad_s", ki),
+                    key("law.pid.kd_v_s_rad", kd),
+                    key("law.pid.coulomb_v", ahead),
+                    smoothing(kappa),
+                ];
+                ("motor_pid", forwards().into_iter().chain(law).collect())
+            }
+            Gains::MotorShell(f, s, kappa) => {
+                let shell = [key("shell.slope_1_s", f), key("shell.boundary_rad_s", s), smoothing(kappa)];
+                ("motor_pid", forwards().into_iter().chain(shell).collect())
+            }
         }
     }
+}
+
+/// A ramp, and an output that cannot turn the axis round.
+fn forwards() -> Vec<(String, String)> {
+    [
+        ("reference", "{ ramp = { rate_deg_s = 2.0 } }"),
+        ("output.lowest_v", "-0.3"),
+        ("output.highest_v", "4.0"),
+        ("model.friction.stribeck.stribeck_velocity_rad_s", "0.003"),
+        ("rig.friction.stribeck.stribeck_velocity_rad_s", "0.003"),
+    ]
+    .map(|(key, text)| (key.to_owned(), text.to_owned()))
+    .to_vec()
 }
 
 /// A scenario of a set.
@@ -126,8 +158,10 @@ fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, rng: &mut Pcg64) 
     let mut rig = base.clone();
     rig.inertia = within(rng, setup.inertia);
     rig.viscous_damping = within(rng, setup.viscous_damping);
-    if let DriveParams::Weight(weight) = &mut rig.drive {
-        weight.mass *= within(rng, setup.drive_torque) / model.drive_torque;
+    match &mut rig.drive {
+        DriveParams::Weight(weight) => weight.mass *= within(rng, setup.drive_torque) / model.drive_torque,
+        DriveParams::Table(load) => load.points.0 = vec![(0.0, within(rng, setup.drive_torque))],
+        _ => {}
     }
     let (mut mu_s, mut mu_d) = (model_friction(model).mu_static, model_friction(model).mu_dynamic);
     let scale = setup.sliding.map(|x| x / mu_d);
@@ -145,8 +179,13 @@ fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, rng: &mut Pcg64) 
         mu_dynamic: mu_d,
         ..model_friction(model)
     });
-    let brake = clutch_core::BrakeActuator { gain: within(rng, gain), ..Default::default() };
-    rig.actuator = brake.into();
+    rig.actuator = match &setup.motor {
+        Some(motor) => {
+            let gain = within(rng, motor.gain);
+            MotorActuator { gain, preload: motor.preload, load_share: 0.0 }.into()
+        }
+        None => BrakeActuator { gain: within(rng, gain), ..Default::default() }.into(),
+    };
     rig
 }
 
@@ -167,7 +206,9 @@ fn run(scenario: &Scenario, setup: &Setup, seconds: f64, seed: u64) -> Outcome<(
     spec.run.settle = 0.0;
     let run = if spec.shell.boundary > 0.0 {
         let way = Way::ALL[(seed % 7) as usize];
-        let law = Adversary { way, seed, highest: spec.output.highest, slope: spec.shell.slope };
+        let [lowest, highest] = [spec.output.lowest, spec.output.highest];
+        let law =
+            Adversary { way, seed, lowest, highest, slope: spec.shell.slope, motor: setup.motor.is_some() };
         simulate_servo(&spec, &Servo::with_law(&spec.servo()?, law)?, Keep::Figures, UNWATCHED)?
     } else {
         clutch_sim::run::simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED)?
@@ -294,6 +335,8 @@ enum Drawn {
     Any,
     /// PID.
     Integral,
+    /// PD and PID with feed-forward, and shells, on motor axes.
+    Motor,
 }
 
 /// Gains, loop and box at random.
@@ -302,7 +345,18 @@ fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
     let delay = f64::from(u8::from(delayed));
     let mut between = |low: f64, high: f64| low * libm::pow(high / low, rng.random::<f64>());
     let kind = between(1.0, 4.0);
-    let gains = if drawn == Drawn::Integral {
+    let gains = if drawn == Drawn::Motor {
+        if kind < 2.0 {
+            let f = if delayed { between(20.0, 60.0) } else { between(30.0, 100.0) };
+            Gains::MotorShell(f, between(0.1, 0.3), between(0.2, 0.7))
+        } else {
+            let kp = between(300.0, 2000.0);
+            // Three of four without an integral, which takes long.
+            let ki = if kind < 3.5 { 0.0 } else { kp * between(2.0, 15.0) };
+            let ahead = 0.6 * between(0.5, 1.3);
+            Gains::MotorPid([kp, ki, kp * between(0.006, 0.016)], between(0.2, 1.0), ahead)
+        }
+    } else if drawn == Drawn::Integral {
         let kp = between(800.0, 4000.0);
         Gains::Pid(kp, kp * between(2.0, 15.0), kp * between(0.005, 0.012), between(0.3, 1.0))
     } else if kind < 1.4 {
@@ -326,19 +380,29 @@ fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
     let (noise, ripple) = (percent(0.001), percent(0.05));
     let damping = percent(50.0);
     let rate = 2.0 * libm::pow(15.0, rng.random::<f64>());
-    let scenario = scenario(
-        gains,
-        &[
-            ("rig.delay_ticks", delay),
-            ("reference.ramp.rate_deg_s", rate),
-            ("rig.torque_noise_nm", noise),
-            ("bounds.friction_percent", friction),
-            ("bounds.inertia_percent", inertia),
-            ("bounds.drive_torque_percent", torque),
-            ("bounds.brake_gain_percent", gain),
-            ("bounds.viscous_damping_percent", damping),
-        ],
-    )?;
+    let mut keys = vec![
+        ("rig.delay_ticks", delay),
+        ("reference.ramp.rate_deg_s", rate),
+        ("rig.torque_noise_nm", noise),
+        ("bounds.friction_percent", friction),
+        ("bounds.inertia_percent", inertia),
+        ("bounds.drive_torque_percent", torque),
+        ("bounds.viscous_damping_percent", damping),
+    ];
+    if drawn == Drawn::Motor {
+        let load = 0.004 * (2.0 * rng.random::<f64>() - 1.0);
+        keys.extend([
+            ("model.drive_torque_nm", load),
+            ("bounds.motor_gain_percent", gain),
+            (
+                "model.friction.stribeck.stribeck_velocity_rad_s",
+                0.0005 * libm::pow(20.0, rng.random::<f64>()),
+            ),
+        ]);
+    } else {
+        keys.push(("bounds.brake_gain_percent", gain));
+    }
+    let scenario = scenario(gains, &keys)?;
     if ripple == 0.0 {
         return Ok(scenario);
     }
@@ -376,6 +440,20 @@ const INTEGRALS: [(Gains, f64, f64, f64); 8] = [
     (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 20.0, 0.0),
     (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 2.0, 40.0),
     (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 1.0, 2.0, 0.0),
+];
+
+/// Motor axes: delay in ticks, rate in °/s, tolerance of friction in %.
+const MOTORS: [(Gains, f64, f64, f64); 10] = [
+    (Gains::MotorPid([500.0, 0.0, 8.0], 0.5, 0.0), 0.0, 2.0, 0.0),
+    (Gains::MotorPid([500.0, 0.0, 8.0], 0.5, 0.6), 0.0, 2.0, 0.0),
+    (Gains::MotorPid([500.0, 0.0, 8.0], 0.5, 0.6), 0.0, 2.0, 30.0),
+    (Gains::MotorPid([500.0, 0.0, 8.0], 0.5, 0.6), 1.0, 20.0, 30.0),
+    (Gains::MotorPid([1500.0, 0.0, 16.0], 0.7, 0.6), 1.0, 2.0, 30.0),
+    (Gains::MotorPid([500.0, 5000.0, 8.0], 0.5, 0.6), 0.0, 2.0, 0.0),
+    (Gains::MotorShell(50.0, 0.2, 0.2), 0.0, 2.0, 0.0),
+    (Gains::MotorShell(50.0, 0.2, 0.2), 0.0, 2.0, 30.0),
+    (Gains::MotorShell(50.0, 0.2, 0.2), 1.0, 2.0, 30.0),
+    (Gains::MotorShell(50.0, 0.2, 0.2), 0.0, 20.0, 0.0),
 ];
 
 /// Sets of one kind, each with its delay, rate and tolerance.
@@ -488,14 +566,20 @@ fn main() -> Outcome<()> {
         Some("table") => table(&words.next().unwrap_or_default()),
         Some("integral") => sets(&INTEGRALS, "K_p, K_i, K_d, K_Kal"),
         Some("shell") => sets(&SHELLS, "f, S, K_Kal"),
-        Some(name @ ("campaign" | "campaign-integral")) => {
-            let drawn = if name == "campaign" { Drawn::Any } else { Drawn::Integral };
+        Some("motor") => sets(&MOTORS, "law"),
+        Some(name @ ("campaign" | "campaign-integral" | "campaign-motor")) => {
+            let drawn = match name {
+                "campaign" => Drawn::Any,
+                "campaign-integral" => Drawn::Integral,
+                _ => Drawn::Motor,
+            };
             let mut number = |default: u64| words.next().map_or(Ok(default), |word| word.parse());
             campaign(drawn, number(10_000)?, number(0)?)
         }
         _ => {
-            Err("expected table [SET], integral, shell, or campaign or campaign-integral [RUNS] [FIRST_SEED]"
-                .into())
+            let verbs = "table [SET], integral, shell, motor, or campaign, campaign-integral or campaign-motor \
+                 [RUNS] [FIRST_SEED]";
+            Err(format!("expected {verbs}").into())
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{Scenario, ScenarioBounds};
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::run::Start;
-use clutch_certificate::{Gains, Setup};
+use clutch_certificate::{Gains, Motor, Setup};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::{LawParams, SampledForm};
 use clutch_core::params::Choice;
@@ -33,19 +33,45 @@ fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> Not
     NotCovered { key, what: what.into(), covered }
 }
 
-/// Gains, on a ramp forwards, of a law that has a sampled certificate of its own, within an output's limits, V.
-pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2]) -> Option<Gains> {
+/// Gains, on a ramp forwards, of a law that has a sampled certificate of its own, within an output's limits, V; `motor` if it
+/// drives one.
+pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2], motor: bool) -> Option<Gains> {
     Some(match law.sampled()? {
         SampledForm::Linear { kp, ki, tracking_time, kd, bias, coulomb, velocity } => {
-            let forward = bias - (coulomb + velocity * rate);
+            let ahead = coulomb + velocity * rate;
+            let forward = if motor { bias + ahead } else { bias - ahead };
             if ki > 0.0 {
                 Gains::Pid { kp, ki, kd, forward, tracking: tracking_time, limits }
             } else {
                 Gains::Pd { kp, kd, forward }
             }
         }
+        SampledForm::Layer { .. } if motor => return None,
         SampledForm::Layer { kp, kd, slope, boundary } => Gains::Smc { kp, kd, slope, boundary },
     })
+}
+
+/// Refuses a motor that may turn a shaft of the box round.
+fn goes_forwards(s: &Setup) -> Result<(), NotCovered> {
+    let Some(motor) = &s.motor else { return Ok(()) };
+    let friction = s.at_rest[0].min(s.sliding[0]) * (1.0 - s.ripple) * motor.preload;
+    // What friction holds of a shaft that nothing but the motor and the load pushes backwards.
+    let left = friction + s.drive_torque[0] - s.torque_noise;
+    let holds = -left / if left > 0.0 { motor.gain[1] } else { motor.gain[0] };
+    // A converter may round it down by half a step, and a law by a ten-thousandth of a volt.
+    let lowest = s.volts[0].min(s.start_volts[0]) - 0.5 * s.converter_step - 1e-4;
+    if lowest < holds {
+        return Err(not(
+            "output.lowest_v",
+            format!(
+                "{} V at a motor, which may turn the shaft round: friction surely holds from {:.3} V on",
+                s.volts[0],
+                (1e3 * (holds + 0.5 * s.converter_step + 1e-4)).ceil() / 1e3
+            ),
+            "motors that go forwards alone",
+        ));
+    }
+    Ok(())
 }
 
 /// Lower and upper end.
@@ -80,9 +106,10 @@ impl Scenario {
     /// A part of the scenario that the sampled-data certificate does not cover, by its key.
     pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
         let p = &self.params;
-        let law = self.law_of_the_loop()?;
         let (smoothing, rate) = self.smoothing_and_rate()?;
         let (plant, stribeck) = self.shaft_of_the_loop(bounds)?;
+        let motor = self.motor_of_the_loop(bounds)?;
+        let law = self.law_of_the_loop(motor.is_some())?;
         self.check_sensor_and_delay()?;
         let rig = Rig::new(&p.rig, p.run.seed)
             .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
@@ -90,13 +117,14 @@ impl Scenario {
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let (_, ripple) = p.bounds.friction_shares(swing);
         let friction = plant.friction();
-        Ok(Setup {
+        let setup = Setup {
             period_s: p.sampling.sampling.period.seconds(),
             counts_per_rev: p.rig.encoder.sensor.counts_per_rev,
             inertia: ends(&bounds.inertia),
             drive_torque: ends(&bounds.drive_torque),
             viscous_damping: ends(&bounds.viscous_damping),
             brake_gain: ends(&bounds.brake_gain),
+            motor,
             sliding: ends(&p.bounds.mean_of(&bounds.friction_sliding)),
             at_rest: ends(&p.bounds.mean_of(&bounds.friction_at_rest)),
             rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
@@ -111,20 +139,26 @@ impl Scenario {
             law,
             from_rest: p.run.start == Start::Rest,
             start_volts: self.start_volts(bounds, rate, ripple),
-        })
+        };
+        goes_forwards(&setup)?;
+        Ok(setup)
     }
 
     /// The gains of the law, or the shell within which it stands.
-    fn law_of_the_loop(&self) -> Result<Gains, NotCovered> {
+    fn law_of_the_loop(&self, motor: bool) -> Result<Gains, NotCovered> {
         let (law, shell) = (&self.params.law, self.params.shell);
         if shell.boundary > 0.0 {
             return Ok(Gains::Shell { slope: shell.slope, boundary: shell.boundary });
         }
         // Other paths are refused, whatever the law gives on them.
         let rate = if let ReferenceParams::Ramp(ramp) = self.params.reference { ramp.rate } else { 0.0 };
-        let covered = "PD (4), PID without derivative_time_s, SMC (31), and any law in a [shell]";
+        let covered = if motor {
+            "PD (4), PID without derivative_time_s, and any law in a [shell], with a motor"
+        } else {
+            "PD (4), PID without derivative_time_s, SMC (31), and any law in a [shell]"
+        };
         let limits = self.limits();
-        let gains = gains(law, rate, limits).ok_or_else(|| not("law", law.title(), covered))?;
+        let gains = gains(law, rate, limits, motor).ok_or_else(|| not("law", law.title(), covered))?;
         // The law takes back what a limit cuts off such a voltage.
         match gains {
             Gains::Pd { forward, .. } | Gains::Pid { forward, .. }
@@ -159,10 +193,10 @@ impl Scenario {
 
     /// The believed shaft, and velocity (rad/s) and exponent of Stribeck's with which its friction falls.
     fn shaft_of_the_loop(&self, bounds: &Bounds) -> Result<(Plant<f64>, [f64; 2]), NotCovered> {
-        if bounds.actuator != ActuatorKind::Brake {
-            return Err(not("model.actuator", "an actuator that drives", "brakes"));
+        if bounds.actuator == ActuatorKind::Both {
+            return Err(not("model.actuator", "a brake and a motor on one signal", "brakes and motors"));
         }
-        if bounds.preload > 0.0 {
+        if bounds.actuator == ActuatorKind::Brake && bounds.preload > 0.0 {
             return Err(not(
                 "model.actuator.brake.preload_nm",
                 "a disc that drags",
@@ -176,6 +210,21 @@ impl Scenario {
         };
         let velocity = if fall.velocity > 0.0 { fall.velocity } else { AT_ONCE };
         Ok((plant, [velocity, fall.exponent]))
+    }
+
+    /// The motor, of an axis that has one.
+    fn motor_of_the_loop(&self, bounds: &Bounds) -> Result<Option<Motor>, NotCovered> {
+        if bounds.actuator != ActuatorKind::Motor {
+            return Ok(None);
+        }
+        if bounds.load_share > 0.0 {
+            return Err(not(
+                "model.actuator.motor.load_share",
+                "friction that grows with the motor's torque",
+                "motors without load_share",
+            ));
+        }
+        Ok(Some(Motor { gain: ends(&bounds.motor_gain), preload: bounds.preload }))
     }
 
     /// Refuses a lag, a sensor without steps, a bumpless start and a long delay.
@@ -212,7 +261,7 @@ impl Scenario {
     /// Largest torque of the noise, N m.
     fn torque_noise(&self, bounds: &Bounds) -> Result<f64, NotCovered> {
         let noise = NOISE_ROOTS * self.params.rig.torque_noise;
-        if noise >= bounds.drive_torque.low {
+        if bounds.actuator == ActuatorKind::Brake && noise >= bounds.drive_torque.low {
             return Err(not(
                 "rig.torque_noise_nm",
                 format!(
@@ -236,10 +285,26 @@ impl Scenario {
         [p.output.lowest.max(bottom), p.output.highest.min(top)]
     }
 
-    /// Voltages between which the brake's is before the first tick, at a rate (rad/s) and with so much ripple, V: as
+    /// Voltages between which that of brake or motor is before the first tick, at a rate (rad/s) and with so much ripple, V: as
     /// [`Rig::resting_voltage`] and [`Rig::sliding_voltage`], for each plant of the box.
     fn start_volts(&self, bounds: &Bounds, rate: f64, ripple: f64) -> [f64; 2] {
         let p = &self.params;
+        if bounds.actuator == ActuatorKind::Motor {
+            let [weak, strong] = ends(&bounds.motor_gain);
+            // From rest the motor carries the load alone.
+            let friction = if p.run.start == Start::Rest {
+                [0.0; 2]
+            } else {
+                let drag = bounds.viscous_damping.high * rate;
+                [bounds.friction.low * bounds.preload, bounds.friction.high * bounds.preload + drag]
+            };
+            let (low, high) = (friction[0] - bounds.drive_torque.high, friction[1] - bounds.drive_torque.low);
+            let converter = p.rig.dac.converter;
+            let reached = |volts: f64| volts.clamp(converter.lowest, converter.highest);
+            let least = low / if low > 0.0 { strong } else { weak };
+            let most = high / if high > 0.0 { weak } else { strong };
+            return [reached(least), reached(most)];
+        }
         // Before the first tick the brake has what the rig gives it, beyond the output's limits, too.
         let reached = p.rig.dac.converter.highest;
         let (torque, gain) = (ends(&bounds.drive_torque), ends(&bounds.brake_gain));

@@ -208,11 +208,12 @@ fn ticks(s: &Setup) -> String {
 
 /// The sides of the box that are no points, its ramp and its delay.
 fn short_scope(s: &Setup) -> String {
+    let (name, gain) = gain(s);
     let sides = [
         ("mu_d", s.sliding, ""),
         ("mu_s", s.at_rest, ""),
         ("T_u", s.drive_torque, " N m"),
-        ("K_COF", s.brake_gain, " N m/V"),
+        (name, gain, " N m/V"),
         ("J", s.inertia, " kg m²"),
         ("C_d", s.viscous_damping, " N m s/rad"),
     ];
@@ -233,14 +234,20 @@ fn short_scope(s: &Setup) -> String {
     parts.join(", ")
 }
 
+/// The actuator's gain, by its symbol.
+fn gain(s: &Setup) -> (&'static str, [f64; 2]) {
+    s.motor.as_ref().map_or(("K_COF", s.brake_gain), |motor| ("k_t", motor.gain))
+}
+
 /// The plants and the loop that a bound speaks of.
 fn scope(s: &Setup) -> String {
     let range = |side: [f64; 2]| {
         let [low, high] = side;
         if exact(side) { number(low) } else { format!("{} … {}", number(low), number(high)) }
     };
+    let (name, gain) = gain(s);
     let mut out = format!(
-        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, K_COF {} N m/V",
+        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, {name} {} N m/V",
         number(1e6 * s.period_s),
         ticks(s),
         s.counts_per_rev,
@@ -251,8 +258,11 @@ fn scope(s: &Setup) -> String {
         if s.rest_not_below_sliding { ", never below mu_d" } else { "" },
         range(s.inertia),
         range(s.drive_torque),
-        range(s.brake_gain),
+        range(gain),
     );
+    if let Some(motor) = &s.motor {
+        out += &format!(", N_0 {} N m, volts {}", number(motor.preload), range(s.volts));
+    }
     if let Gains::Shell { slope, boundary } = s.law {
         out += &format!("; shell f {} 1/s, S {} rad/s", number(slope), number(boundary));
     }
@@ -272,7 +282,7 @@ impl Scenario {
         let setup = self.sampled_setup(bounds);
         // A shell has no gains: the law within has, where it is one of these.
         let within = |s: &Setup| {
-            let gains = gains(&self.params.law, s.rate, self.limits());
+            let gains = gains(&self.params.law, s.rate, self.limits(), s.motor.is_some());
             gains.and_then(|law| stability(&Setup { law, ..s.clone() }))
         };
         let stability = setup.as_ref().ok().and_then(within);
