@@ -265,14 +265,16 @@ class Candidate:
     gains : dict of str to float
         The gains that were varied, by their dotted keys, SI.
     cost : float or None
-        Cycles/s + 30 × RMS error in degrees + longest stick over 20 ms, on the worst of all runs; None if it
-        left its path.
+        On a ramp cycles/s + 30 × RMS error in degrees + longest stick over 20 ms; along another path 30 × RMS error +
+        10 × largest error in degrees. On the worst of all runs; None if it left its path.
     cycles_per_s : float
         Stick-slip cycles a second, in the worst run.
     max_error_rad : float
         Largest error, rad.
     longest_stick_s : float
         Longest stick, s.
+    control_variation_v_s : float
+        Total variation of the voltage, per time, in the worst run, V/s.
     runs, runs_with_sticks : int
         Runs behind these figures, and those in which the shaft stuck.
     error_bound_rad : float or None
@@ -299,6 +301,7 @@ class Candidate:
     cycles_per_s: float
     max_error_rad: float
     longest_stick_s: float
+    control_variation_v_s: float
     runs: int
     runs_with_sticks: int
     error_bound_rad: float | None
@@ -319,7 +322,10 @@ class Tuned:
     verdict : str
         The proven property of it, with its scope; or the limiting condition.
     rates_deg_s : tuple of float
-        Rates that it was tuned for, °/s.
+        Rates of the ramp that it was tuned for, °/s; none along another path.
+    output_v : tuple of float or None
+        Lowest and highest voltage that a motor's output was limited to, so that it goes forwards alone, V; None where it
+        has the scenario's limits.
     simulated_s : float
         Simulated time, s.
 
@@ -338,6 +344,8 @@ class Tuned:
         chosen: int | None = told["chosen"]
         self.winner: Candidate | None = None if chosen is None else self.candidates[chosen]
         self.rates_deg_s: tuple[float, ...] = tuple(told["rates_deg_s"])
+        limits = told["output_v"]
+        self.output_v: tuple[float, float] | None = None if limits is None else (limits[0], limits[1])
         self.simulated_s: float = told["simulated_s"]
 
     @property
@@ -438,6 +446,7 @@ def _candidate(row: dict[str, Any], file: str | None) -> Candidate:
         cycles_per_s=score["cycles_per_s"],
         max_error_rad=score["max_error_rad"],
         longest_stick_s=score["longest_stick_s"],
+        control_variation_v_s=score["control_variation_v_s"],
         runs=score["runs"],
         runs_with_sticks=score["runs_with_sticks"],
         error_bound_rad=verdict.get("error_rad"),
@@ -461,12 +470,13 @@ def tune(
     Parameters
     ----------
     scenario : Scenario, str or path
-        A scenario of the rig whose path is a ramp.
+        A scenario of the rig. On a ramp smooth means without sticks, and a certificate is looked for; along another path,
+        which may rest and turn round, the error counts, and `uncertified` is needed.
     identified : Identified, optional
         The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with its rig's delay and
         ripple.
     rates_deg_s : iterable of float, optional
-        Rates at which it is to be smooth, °/s; default: the scenario's own.
+        Rates of the ramp at which it is to be smooth, °/s; default: the scenario's own.
     candidates : int, default 32
         Candidates of each law.
     uncertified : bool, default False
@@ -482,7 +492,7 @@ def tune(
     Raises
     ------
     ParamError
-        A path that is no ramp, a rig without a brake, or a value out of range.
+        Rates for a path that is no ramp, a rig with brake and motor on one signal, or a value out of range.
     OSError
         The file cannot be read.
 

@@ -121,7 +121,7 @@ def test_pictures_have_what_they_say(rig, tuned):
 @pytest.mark.parametrize(
     ("scenario", "more", "field", "said"),
     [
-        ("minimum_jerk", {}, "reference", "a ramp"),
+        ("minimum_jerk", {"rates_deg_s": [2]}, "rates", "expected none, as [reference.minimum_jerk] has velocities"),
         ("board_smc_2", {"rates_deg_s": [-1]}, "rates", "rates = -1: expected finite numbers above 0 °/s"),
         ("board_smc_2", {"candidates": 0}, "candidates", "a whole number from 1 to 10000"),
     ],
@@ -131,6 +131,20 @@ def test_what_cannot_be_tuned_is_refused_by_key_and_value(scenario, more, field,
         clutch.tune(scenario, **more)
     assert refused.value.field == field
     assert said in str(refused.value)
+
+
+def test_a_motor_axis_is_tuned_on_a_ramp_with_a_proof_and_along_its_own_path_without():
+    ramp = {"reference": {"ramp": {"rate_deg_s": 2.0}}}
+    tuned = clutch.tune("motor_pid", candidates=2, overrides=ramp)
+    assert tuned.winner.error_bound_rad < 0.02 and tuned.winner.runs_with_sticks == 0
+    assert -0.6 < tuned.output_v[0] < 0 < tuned.output_v[1] == pytest.approx(3.0)
+    result = clutch.simulate(tuned.scenario, overrides={"run.duration_s": 3.0, "run.seed": 7})
+    assert result.metrics.max_error_rad < tuned.winner.error_bound_rad
+    told = command("tune", "motor_pid", "--candidates", "2", "--set", "reference={ramp={rate_deg_s=2.0}}", "--json")
+    assert told["output_v"] == list(tuned.output_v)
+    own = clutch.tune("motor_pid", candidates=2, uncertified=True, overrides={"run.duration_s": 6.0})
+    assert own.rates_deg_s == () and own.output_v is None and "a path that accelerates" in own.verdict
+    assert own.winner.max_error_rad < clutch.simulate("motor_pid").metrics.max_error_rad
 
 
 def test_without_a_certificate_nothing_is_given_out():

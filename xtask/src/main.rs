@@ -198,8 +198,8 @@ enum Verb {
         #[arg(default_value_t = 10_001)]
         seed: u64,
     },
-    /// Identifies and tunes hidden random rigs, and drives them by the loop in virtual time: the table of docs/tune.md, half an
-    /// hour. Stopped and started again it goes on with the next rig.
+    /// Identifies and tunes hidden random rigs and motor axes, and drives them by the loop in virtual time: the tables of
+    /// docs/tune.md, half an hour. Stopped and started again it goes on with the next rig.
     Tune {
         /// Rigs.
         #[arg(default_value_t = 50)]
@@ -309,7 +309,15 @@ fn main() -> Result<()> {
             random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed + MOTORS)
         }
         Verb::Tune { rigs, seed } => {
-            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", rigs, seed)
+            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", rigs, seed)?;
+            // A reversal takes most of a minute to tune for.
+            random_rigs(
+                ["clutch-tune", "tuned_motors"],
+                "docs/tune.md",
+                "motors",
+                (2 * rigs).div_ceil(5),
+                seed,
+            )
         }
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
@@ -424,7 +432,9 @@ fn certified(runs: u64) -> Result<()> {
     write_between("docs/certified.md", "campaign", &campaign)?;
     let integrals = table_of("certified", &["campaign-integral", &(runs / 5).to_string()])?;
     write_between("docs/certified.md", "campaign-integral", &integrals)?;
-    for table in ["integral", "shell"] {
+    let motors = table_of("certified", &["campaign-motor", &runs.to_string(), "300000"])?;
+    write_between("docs/certified.md", "campaign-motor", &motors)?;
+    for table in ["integral", "shell", "motor"] {
         write_between("docs/certified.md", table, &table_of("certified", &[table])?)?;
     }
     write_between("docs/certified.md", "table", &table_of("certified", &["table"])?)

@@ -21,9 +21,9 @@ use std::path::{Path, PathBuf};
 ///
 /// Candidates of each law run on simulated rigs at the corners of the bounds, on discs that no gain was chosen on; the
 /// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. The scenario's law
-/// is tried with its own gains, too. On a ramp smooth means without sticks; along another path the error counts. Motors, and
-/// paths that are no ramps, have no certificate yet: they need --uncertified. Exit code 0: gains are given out; 2: none is
-/// certified, or none starts from rest.
+/// is tried with its own gains, too. On a ramp smooth means without sticks; along another path, which has no certificate yet
+/// and needs --uncertified, the error counts. Exit code 0: gains are given out; 2: none is certified, or none starts from
+/// rest.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  clutch tune board_smc_2 --identified rig.toml --out tuned.toml\n  \
     clutch tune mine.toml --rates 1,2,6 --html tuned.html\n  \
@@ -263,6 +263,10 @@ fn text(tuned: &Tuned) -> String {
         if winner.gains.is_empty() {
             out += "  the scenario's own gains, or the law's defaults\n";
         }
+        if let Some([lowest, highest]) = tuned.output_v {
+            out += &format!("  output.lowest_v = {}\n", number(lowest));
+            out += &format!("  output.highest_v = {}\n", number(highest));
+        }
         if let Some(s) = &tuned.from_rest {
             let (at, sticks) = match tuned.rates_deg_s.first() {
                 Some(rate) => (format!("at {} °/s ", number(*rate)), "no stick after the first second, "),
@@ -347,7 +351,11 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
     });
     let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let gains = tuned.winner().map_or(&[][..], |winner| &winner.gains);
-    let gains = gains.iter().map(|(key, value)| vec![key.clone(), number(*value)]);
+    let output = tuned.output_v.into_iter().flat_map(|[lowest, highest]| {
+        [("output.lowest_v".to_owned(), lowest), ("output.highest_v".to_owned(), highest)]
+    });
+    let output: Vec<(String, f64)> = output.collect();
+    let gains = gains.iter().chain(&output).map(|(key, value)| vec![key.clone(), number(*value)]);
     let table = |id: &str, title: &str, caption: &str, rows, words| ReportTable {
         id: id.to_owned(),
         title: title.to_owned(),

@@ -20,16 +20,17 @@ use clutch_identify::motor::rig_file::rig_file;
 use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::{Table, Value};
-use clutch_tune::{Options, Tuned, tune};
-use course::{Kept, degrees, drive, known, median, on_hidden, rigs_and_seed};
+use clutch_tune::{Options, Tuned, Verdict, tune};
+use course::{Kept, degrees, drive, known, largest_ripple, median, on_hidden, rigs_and_seed};
 use random_rig::Outcome;
-use random_rig::motor::truth;
+use random_rig::motor::{Truth, truth};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// What an axis is tuned for: name, path, and time of the loop's run with its settling time, s.
-const PATHS: [(&str, &str, [f64; 2]); 2] = [
+const PATHS: [(&str, &str, [f64; 2]); 3] = [
     ("a ramp at 2 °/s", "[reference.ramp]\nrate_deg_s = 2.0", [10.0, 1.0]),
+    ("a ramp at 4 °/s", "[reference.ramp]\nrate_deg_s = 4.0", [10.0, 1.0]),
     (
         "to and fro by 2°, at 0.5 °/s at most",
         "[reference.sine]\nrate_deg_s = 0.0\namplitude_deg = 1.0\nfrequency_hz = 0.0795775",
@@ -42,16 +43,24 @@ const PATHS: [(&str, &str, [f64; 2]); 2] = [
 struct Course {
     /// The law that was given out.
     law: Option<String>,
+    /// The proven bound on the error, rad.
+    bound: Option<f64>,
+    /// Quantities of the true axis outside of the box that the certificate speaks of.
+    outside: Vec<String>,
     /// The loop with it.
     tuned: Option<Run>,
     /// The loop with the gains from a text book that the axis came with.
     untuned: Run,
     tuning_s: f64,
+    /// Where nothing was given out, the standing of each law.
+    standing: Vec<String>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Run {
-    /// Largest and root mean square error, rad.
+    /// Largest error from the start on, rad.
+    largest: f64,
+    /// Largest and root mean square error behind the settling time, rad.
     error: f64,
     rms: f64,
     cycles_per_s: f64,
@@ -75,12 +84,40 @@ fn in_the_loop(scenario: &Scenario) -> Outcome<Run> {
     let driven = drive(scenario)?;
     let m = driven.metrics;
     Ok(Run {
+        largest: driven.largest_error,
         error: m.max_error_rad,
         rms: m.rms_error_rad,
         cycles_per_s: m.stick_slip_cycles_per_s,
         volts_per_s: m.control_variation_v_s,
         ended: driven.ended,
     })
+}
+
+/// Quantities of the axis outside of the box of a tuned scenario; all torques are over the torque per volt.
+fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<String>> {
+    let Ok(setup) = tuned.sampled_setup(&tuned.plan()?.bounds) else {
+        return Ok(vec!["not covered".to_owned()]);
+    };
+    let Some(motor) = setup.motor else { return Ok(vec!["no motor".to_owned()]) };
+    let gain = motor.gain[0];
+    let friction = |volts: f64| volts * gain / motor.preload;
+    let between = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x);
+    // A load that is taken for none counts as friction, which then has to hold both ways.
+    let [load, counted] =
+        if setup.drive_torque[1] == 0.0 { [0.0, truth.load.abs()] } else { [truth.load, 0.0] };
+    let both =
+        |x: f64, ends: [f64; 2]| between(friction(x - counted), ends) && between(friction(x + counted), ends);
+    let held = [
+        ("J/K", between(truth.inertia * gain, setup.inertia)),
+        ("T/K", between(load * gain, setup.drive_torque)),
+        ("T_c/K", both(truth.sliding, setup.sliding)),
+        ("T_s/K", both(truth.at_rest, setup.at_rest)),
+        ("C/K", truth.viscous * gain <= setup.viscous_damping[1]),
+        ("Stribeck velocity", truth.stribeck <= setup.stribeck[0]),
+        ("delay", (truth.delay - f64::from(setup.delay_ticks) * setup.period_s).abs() < 1e-9),
+        ("ripple", largest_ripple(&truth.scenario)? <= setup.ripple),
+    ];
+    Ok(held.into_iter().filter(|(_, holds)| !holds).map(|(name, _)| name.to_owned()).collect())
 }
 
 fn course(seed: u64) -> Outcome<Vec<Course>> {
@@ -103,8 +140,17 @@ fn course(seed: u64) -> Outcome<Vec<Course>> {
             let winner = found.winner();
             let tuned = winner.and_then(|w| w.scenario.as_ref());
             let tuned = tuned.map(|w| in_the_loop(&on_hidden(w, &truth.scenario, *times)?)).transpose()?;
+            let bound = match winner.map(|w| &w.verdict) {
+                Some(Verdict::Certified { error_rad, .. }) => Some(*error_rad),
+                _ => None,
+            };
+            let winning = winner.and_then(|w| w.scenario.as_ref()).filter(|_| bound.is_some());
+            let outside = winning.map_or(Ok(Vec::new()), |w| outside(w, &truth))?;
             let untuned = in_the_loop(&along(&truth.scenario, path, *times)?)?;
-            Ok(Course { law: winner.map(|w| w.name.clone()), tuned, untuned, tuning_s })
+            let law = winner.map(|w| w.name.clone());
+            let of = found.candidates.iter().filter(|_| winner.is_none());
+            let standing = of.map(|c| format!("{}: {:?}", c.name, c.standing)).collect();
+            Ok(Course { law, bound, outside, tuned, untuned, tuning_s, standing })
         })
         .collect()
 }
@@ -135,6 +181,21 @@ fn rows(name: &str, of: &[&Course]) -> String {
     row(&format!("tuned: {}", laws.join(", ")), &tuned) + &row("PID, text-book gains", &untuned)
 }
 
+/// The certificates of a ramp in a sentence.
+fn certified(name: &str, done: &[Vec<Course>], path: usize) -> String {
+    let of: Vec<&Course> = done.iter().map(|course| &course[path]).collect();
+    let count = |f: &dyn Fn(&Course) -> bool| of.iter().filter(|c| f(c)).count();
+    format!(
+        "Of {name} {} of {} are certified, in a shell or as sampled, for errors up to {} (median, largest); {} of these axes lie in \
+         the certified box, and {} bounds were broken.",
+        count(&|c| c.bound.is_some()),
+        of.len(),
+        degrees(of.iter().filter_map(|c| c.bound)),
+        count(&|c| c.bound.is_some() && c.outside.is_empty()),
+        count(&|c| c.bound.zip(c.tuned.as_ref()).is_some_and(|(bound, run)| run.largest > bound)),
+    )
+}
+
 fn main() -> Outcome<()> {
     let (axes, first) = rigs_and_seed()?;
     let mut kept = Kept::open()?;
@@ -157,14 +218,16 @@ fn main() -> Outcome<()> {
     for (n, (name, ..)) in PATHS.iter().enumerate() {
         print!("{}", rows(name, &done.iter().map(|course| &course[n]).collect::<Vec<_>>()));
     }
+    let ramps: Vec<String> = (0..2).map(|n| certified(PATHS[n].0, &done, n)).collect();
     let tuning: Vec<f64> = done.iter().flatten().map(|c| c.tuning_s).collect();
     println!(
-        "{axes} axes from seed {first}, {} of them to the end: {:.1} s of experiment in virtual time; tuning takes {:.0} s here \
-         (median; {:.0} s at most)",
+        "{axes} rigs from seed {first}, {} of them to the end: {:.1} s of experiment in virtual time; tuning takes {:.0} s here \
+         (median; {:.0} s at most). {}",
         done.len(),
         Programme::default().seconds(),
         median(tuning.clone()),
         tuning.iter().copied().fold(0.0, f64::max),
+        ramps.join(" "),
     );
     Ok(())
 }

@@ -17,10 +17,9 @@ use clutch_identify::rig_file::rig_file;
 use clutch_identify::{RigFile, identify};
 use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
-use clutch_sim::rig::Rig;
 use clutch_sim::scenario::Table;
 use clutch_tune::{Options, Tuned, Verdict, tune};
-use course::{Driven, Kept, degrees, drive, known, median, on_hidden, rigs_and_seed};
+use course::{Driven, Kept, degrees, drive, known, largest_ripple, median, on_hidden, rigs_and_seed};
 use random_rig::{Outcome, Truth, truth};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -47,14 +46,6 @@ struct Course {
     told: String,
 }
 
-/// Largest departure of friction from its mean that the disc has, as a share.
-fn largest_ripple(truth: &Truth) -> Outcome<f64> {
-    let rig = Rig::new(&truth.scenario.params().rig, truth.scenario.params().run.seed)?;
-    let ripple = rig.model.ripple.as_ref();
-    let at = |k: u32| ripple.map_or(0.0, |r| (r.factor(f64::from(k) * 1e-5) - 1.0).abs());
-    Ok((0..628_319).step_by(7).map(at).fold(0.0, f64::max))
-}
-
 fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<&'static str>> {
     let plan = tuned.plan()?;
     let mut names = Vec::new();
@@ -74,7 +65,7 @@ fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<&'static str>> {
     check("C/J", truth.damping / truth.pull * torque <= setup.viscous_damping[1]);
     check("Stribeck velocity", truth.stribeck <= setup.stribeck[0]);
     check("delay", (truth.delay - f64::from(setup.delay_ticks) * setup.period_s).abs() < 1e-9);
-    check("ripple", largest_ripple(truth)? <= setup.ripple);
+    check("ripple", largest_ripple(&truth.scenario)? <= setup.ripple);
     Ok(names)
 }
 

@@ -81,7 +81,7 @@ pub(crate) struct Volts {
     /// The voltage that holds the sliding shaft; of a motor the one that accelerates it with 27.7 rad/s².
     motion: f64,
     /// The same of a brake; of a motor the one that friction at rest takes.
-    friction: f64,
+    pub(crate) friction: f64,
 }
 
 impl Volts {
@@ -151,7 +151,7 @@ pub(crate) const FAMILIES: [Family; 7] = [
     },
     family(
         "dob",
-        "PD with observer",
+        "DOB",
         &[
             plain("law.dob.kp_1_s2", 3000.0, 16_000.0),
             plain("law.dob.kd_1_s", 80.0, 500.0),

@@ -45,6 +45,8 @@ const MOST_CANDIDATES: u32 = 10_000;
 const MOST_RATES: usize = 20;
 /// Candidates of a law that go on to the corners.
 const KEPT: usize = 6;
+/// Highest voltage of a motor that goes forwards alone, over that which friction at rest takes.
+const HIGHEST_OVER_REST: f64 = 3.0;
 /// Seeds of discs: to sort the candidates out, to choose among the rest, to judge, and to accept. None is in two of them.
 const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
 const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
@@ -137,7 +139,10 @@ pub struct Tuned {
     pub chosen: Option<usize>,
     /// Its score from rest, at the lowest rate, or along the path.
     pub from_rest: Option<Score>,
-    /// Reason why no law can be certified here, where there is one: of a motor, of a path that is no ramp, of a lag.
+    /// Lowest and highest voltage of a motor that its output was limited to, so that it goes forwards alone, V; none where it has the
+    /// scenario's limits.
+    pub output_v: Option<[f64; 2]>,
+    /// Reason why no law can be certified here, where there is one: of a path that is no ramp, of a lag.
     pub uncovered: Option<String>,
     /// Shells that were tried and not proven, with what limits.
     pub open_shells: Vec<(ShellTried, String)>,
@@ -160,8 +165,8 @@ impl Tuned {
 }
 
 /// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified:
-/// at rates of a ramp, or along the scenario's path where that is no ramp. Motors and paths that are no ramps have no
-/// certificate yet. `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes
+/// at rates of a ramp, or along the scenario's path where that is no ramp, which has no certificate yet. On a ramp a motor gets
+/// limits of its output at which it goes forwards alone, as its certificate asks. `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes
 /// again, on any number of cores. `report` gets each run.
 ///
 /// # Errors
@@ -177,17 +182,22 @@ pub fn tune(
     let Believed { scenario: base, delay_between, corners } = believed(scenario, file)?;
     let lowest = rates_deg_s.first().map(|rate| (RATE.to_owned(), Value::Float(*rate)));
     let base = Scenario::from_table(base.name(), base.table().clone(), lowest.as_slice())?;
-    let uncovered = match delay_between {
-        Some(why) => Some(why),
-        None => uncovered(&base)?,
+    let search = |base: Scenario, output_v: Option<[f64; 2]>| {
+        let uncovered = match &delay_between {
+            Some(why) => Some(why.clone()),
+            None => uncovered(&base)?,
+        };
+        let (rates_deg_s, corners) = (rates_deg_s.clone(), corners.clone());
+        Job { base, rates_deg_s, corners, output_v, uncovered, options, report }.run()
     };
-    let job = Job { base, rates_deg_s, corners, uncovered, options, report };
-    // A shell holds with any law within: it is looked for meanwhile.
-    let (candidates, shells) = rayon::join(|| job.candidates(), || job.shells());
-    let (mut candidates, shells) = (candidates?, shells?);
-    job.shelled(&mut candidates, &shells)?;
-    job.judge(&mut candidates)?;
-    job.choose(candidates, shells)
+    let (limited, output_v) = forwards(&base)?;
+    let found = search(limited, output_v)?;
+    if found.chosen.is_some() || output_v.is_none() || !options.uncertified {
+        return Ok(found);
+    }
+    // Limits that no certificate came of may be in the way.
+    let unlimited = search(base, None)?;
+    Ok(Tuned { simulated_s: unlimited.simulated_s + found.simulated_s, ..unlimited })
 }
 
 /// The rates, checked, the lowest first; none where the path is no ramp.
@@ -243,12 +253,22 @@ struct Job<'a> {
     base: Scenario,
     rates_deg_s: Vec<f64>,
     corners: Vec<Corner>,
+    output_v: Option<[f64; 2]>,
     uncovered: Option<String>,
     options: &'a Options,
     report: Report<'a>,
 }
 
 impl Job<'_> {
+    fn run(&self) -> Result<Tuned, ScenarioError> {
+        // A shell holds with any law within: it is looked for meanwhile.
+        let (candidates, shells) = rayon::join(|| self.candidates(), || self.shells());
+        let (mut candidates, shells) = (candidates?, shells?);
+        self.shelled(&mut candidates, &shells)?;
+        self.judge(&mut candidates)?;
+        self.choose(candidates, shells)
+    }
+
     fn scores(
         &self,
         of: &[&Scenario],
@@ -381,6 +401,7 @@ impl Job<'_> {
             candidates: all.into_iter().map(Finalist::told).collect(),
             chosen: None,
             from_rest: None,
+            output_v: self.output_v,
             uncovered: self.uncovered.clone(),
             open_shells: shells.open.clone(),
             certificate: None,
@@ -508,6 +529,31 @@ fn is_stable(scenario: &Scenario) -> bool {
 fn any_inner(base: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
     let inner = FAMILIES.iter().find(|family| !family.certified_alone());
     inner.map(|family| family.scenario(base, &Gains::new())).transpose()
+}
+
+/// A motor on a ramp with an output that cannot turn it round, which is what a certificate of a motor axis asks for: its lowest voltage
+/// is what friction surely holds, its highest some times what friction at rest takes. Other scenarios are as they are.
+fn forwards(base: &Scenario) -> Result<(Scenario, Option<[f64; 2]>), ScenarioError> {
+    let as_it_is = || Ok((base.clone(), None));
+    let Some(inner) = any_inner(base)? else { return as_it_is() };
+    let inner = within(&inner, &SHELLS[0])?;
+    let Some(turns) = inner.lowest_forwards(&inner.plan()?.bounds).filter(|volts| *volts < 0.0) else {
+        return as_it_is();
+    };
+    let output = base.params().output;
+    let most = HIGHEST_OVER_REST * Volts::of(base).friction;
+    // Three digits, towards 0.
+    let lowest = output.lowest.max((1e3 * turns).ceil() / 1e3);
+    let highest = output.highest.min((1e3 * most).floor() / 1e3);
+    if lowest >= 0.0 || (lowest <= output.lowest && highest >= output.highest) {
+        return as_it_is();
+    }
+    let set = [
+        ("output.lowest_v".to_owned(), Value::Float(lowest)),
+        ("output.highest_v".to_owned(), Value::Float(highest)),
+    ];
+    let limited = Scenario::from_table(base.name(), base.table().clone(), &set)?;
+    Ok((limited, Some([lowest, highest])))
 }
 
 /// Reason why no law is certified on such a rig and path: a shell asks nothing of the law within, and what a shell is not certified

@@ -60,7 +60,8 @@ fn without_a_certificate_nothing_is_given_out_unless_that_is_asked_for() {
     let lag = [("rig.actuator_time_constant_s", "0.001")];
     let found = tuned(&lag, &few());
     assert!(found.winner().is_none() && found.certificate.is_none());
-    assert!(found.open_shells.iter().any(|(_, why)| why.contains("a lag")), "{:?}", found.open_shells);
+    let why = found.uncovered.as_ref().expect("a reason");
+    assert!(why.contains("a lag") && found.open_shells.is_empty(), "{why}");
     // A candidate that sticks where it is judged is refused before anything is proven of it.
     for c in &found.candidates {
         let refused = matches!(&c.standing, Standing::Refused { why } if why.contains("it sticks in"));
@@ -91,7 +92,86 @@ fn mistakes_are_named_by_key_value_and_expectation() {
     assert!(refusal(&[], rates(&[2.0, -1.0])).contains("rates = -1: expected finite numbers above 0 °/s"));
     let none = refusal(&[], Options { candidates: 0, ..few() });
     assert!(none.contains("candidates = 0: expected a whole number from 1 to 10000"), "{none}");
-    let motor = Scenario::built_in("motor_pid").unwrap().unwrap();
-    let motor = tune(&motor, None, &few(), UNWATCHED).unwrap_err().to_string();
-    assert!(motor.contains("a ramp") || motor.contains("brake"), "{motor}");
+    let to_and_fro = tune(&motor(&[]), None, &rates(&[2.0]), UNWATCHED).unwrap_err().to_string();
+    assert!(
+        to_and_fro.contains("rates = 2: expected none, as [reference.sine] has velocities"),
+        "{to_and_fro}"
+    );
+    let actuator = "{both={brake_gain_nm_v=0.14,motor_gain_nm_v=0.02}}";
+    let both = [("rig.actuator", actuator), ("model.actuator", actuator), ("output.lowest_v", "-10.0")];
+    let both = refusal(&both, few());
+    assert!(both.contains("rig.actuator = both: expected a brake or a motor"), "{both}");
+}
+
+fn motor(set: &[(&str, &str)]) -> Scenario {
+    let set: Vec<(String, String)> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let text = Scenario::text("motor_pid".as_ref()).unwrap().1;
+    Scenario::parse("axis", &text, &set).unwrap()
+}
+
+const RAMP: (&str, &str) = ("reference", "{ramp={rate_deg_s=2.0}}");
+
+#[test]
+fn a_motor_axis_on_a_ramp_gets_a_certified_law_and_an_output_that_goes_forwards() {
+    // A load that pushes backwards, friction and inertia within some per cent.
+    let set = [
+        RAMP,
+        ("model.drive_torque_nm", "-0.003"),
+        ("rig.drive.table.points_s_nm", "[[0.0, -0.003]]"),
+        ("bounds.friction_percent", "5.0"),
+        ("bounds.inertia_percent", "2.0"),
+        ("bounds.drive_torque_percent", "50.0"),
+    ];
+    let found = tune(&motor(&set), None, &few(), UNWATCHED).unwrap();
+    // Two loads, two inertias, two frictions.
+    assert_eq!(found.corners.len(), 8);
+    let winner = found.winner().expect("a winner");
+    let Verdict::Certified { error_rad, .. } = winner.verdict else { panic!("{winner:?}") };
+    let certificate = found.certificate.as_ref().unwrap();
+    assert_eq!(checker::check(certificate).unwrap().error_bound, error_rad);
+    // Friction of 28.5 mN m less a load of up to 4.5 holds 0.48 V.
+    let [lowest, highest] = found.output_v.expect("limits");
+    assert!((-0.48..-0.46).contains(&lowest) && (2.9..3.1).contains(&highest), "{lowest} {highest}");
+    let scenario = winner.scenario.as_ref().unwrap();
+    let output = scenario.params().output;
+    assert_eq!([output.lowest, output.highest], [lowest, highest]);
+    assert_eq!(scenario.sampled_setup(&scenario.plan().unwrap().bounds).unwrap(), certificate.setup);
+    // On a corner of the box that nobody has tried the error stays within the bound.
+    let seed = [
+        ("run.seed".to_owned(), Value::Integer(777)),
+        ("run.settle_s".to_owned(), Value::Float(0.0)),
+        ("rig.inertia_kg_m2".to_owned(), Value::Float(0.0017 * 0.98)),
+        ("rig.actuator.motor.preload_nm".to_owned(), Value::Float(0.25 * 1.05)),
+    ];
+    let again = Scenario::from_table("tuned", scenario.canonical().parse().unwrap(), &seed).unwrap();
+    let metrics = again.run(Keep::Figures, UNWATCHED).unwrap().metrics;
+    assert!(metrics.max_error_rad < error_rad, "{metrics:?}");
+    // A motor that may turn round has no certificate, and the reason names the limit that would do.
+    let text = scenario.canonical();
+    let wide = [("output.lowest_v".to_owned(), "-2.0".to_owned())];
+    let wide = Scenario::parse("wide", &text, &wide).unwrap();
+    let why = wide.sampled_setup(&wide.plan().unwrap().bounds).unwrap_err().to_string();
+    assert!(
+        why.contains("-2 V at a motor, which may turn the shaft round") && why.contains("-0.47"),
+        "{why}"
+    );
+}
+
+#[test]
+fn along_a_path_that_turns_round_the_error_decides_and_nothing_is_certified() {
+    let set = [("run.duration_s", "6.0"), ("run.settle_s", "1.0")];
+    let found = tune(&motor(&set), None, &few(), UNWATCHED).unwrap();
+    assert!(found.winner().is_none() && found.rates_deg_s.is_empty() && found.output_v.is_none());
+    assert!(found.uncovered.as_ref().unwrap().contains("a path that accelerates"), "{:?}", found.uncovered);
+    assert!(found.candidates.iter().any(|c| c.name == "glide with micro-steps"), "{:?}", found.candidates);
+    let found = tune(&motor(&set), None, &Options { uncertified: true, ..few() }, UNWATCHED).unwrap();
+    let winner = found.winner().expect("a winner");
+    // It rests at each reversal, and is not refused for it; its cost is that of its errors.
+    assert!(winner.score.runs_with_sticks > 0);
+    let errors =
+        30.0 * winner.score.rms_error_rad.to_degrees() + 10.0 * winner.score.max_error_rad.to_degrees();
+    let cost = winner.score.cost.unwrap();
+    assert!(cost <= errors + 1e-9 && cost > 0.5 * errors, "{cost} {errors}");
+    let own = motor(&set).run(Keep::Figures, UNWATCHED).unwrap().metrics;
+    assert!(winner.score.max_error_rad < 0.5 * own.max_error_rad, "{:?} {own:?}", winner.score);
 }

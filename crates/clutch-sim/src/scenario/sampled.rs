@@ -51,27 +51,30 @@ pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2], motor: bool) -
     })
 }
 
-/// Refuses a motor that may turn a shaft of the box round.
-fn goes_forwards(s: &Setup) -> Result<(), NotCovered> {
-    let Some(motor) = &s.motor else { return Ok(()) };
+/// Lowest voltage of a motor that surely turns no shaft of the box round, V: friction holds what motor and load push backwards, and a
+/// converter may round half a step down, a law a ten-thousandth of a volt.
+fn turns_below(s: &Setup) -> Option<f64> {
+    let motor = s.motor.as_ref()?;
     let friction = s.at_rest[0].min(s.sliding[0]) * (1.0 - s.ripple) * motor.preload;
-    // What friction holds of a shaft that nothing but the motor and the load pushes backwards.
     let left = friction + s.drive_torque[0] - s.torque_noise;
     let holds = -left / if left > 0.0 { motor.gain[1] } else { motor.gain[0] };
-    // A converter may round it down by half a step, and a law by a ten-thousandth of a volt.
-    let lowest = s.volts[0].min(s.start_volts[0]) - 0.5 * s.converter_step - 1e-4;
-    if lowest < holds {
-        return Err(not(
+    Some(holds + 0.5 * s.converter_step + 1e-4)
+}
+
+/// Refuses a motor that may turn a shaft of the box round.
+fn goes_forwards(s: &Setup) -> Result<(), NotCovered> {
+    match turns_below(s) {
+        Some(limit) if s.volts[0].min(s.start_volts[0]) < limit => Err(not(
             "output.lowest_v",
             format!(
-                "{} V at a motor, which may turn the shaft round: friction surely holds from {:.3} V on",
+                "{} V at a motor, which may turn the shaft round: friction surely holds it from {:.3} V on",
                 s.volts[0],
-                (1e3 * (holds + 0.5 * s.converter_step + 1e-4)).ceil() / 1e3
+                (1e3 * limit).ceil() / 1e3
             ),
             "motors that go forwards alone",
-        ));
+        )),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Lower and upper end.
@@ -105,6 +108,20 @@ impl Scenario {
     /// # Errors
     /// A part of the scenario that the sampled-data certificate does not cover, by its key.
     pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
+        let setup = self.setup_either_way(bounds)?;
+        goes_forwards(&setup)?;
+        Ok(setup)
+    }
+
+    /// Lowest voltage of a motor that turns no shaft of the bounds round on a ramp forwards, V; none of a brake, and where the
+    /// sampled-data certificate covers no such axis whatever its output is.
+    #[must_use]
+    pub fn lowest_forwards(&self, bounds: &Bounds) -> Option<f64> {
+        turns_below(&self.setup_either_way(bounds).ok()?)
+    }
+
+    /// [`Scenario::sampled_setup`], also of a motor that may turn the shaft round.
+    fn setup_either_way(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
         let p = &self.params;
         let (smoothing, rate) = self.smoothing_and_rate()?;
         let (plant, stribeck) = self.shaft_of_the_loop(bounds)?;
@@ -117,7 +134,7 @@ impl Scenario {
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let (_, ripple) = p.bounds.friction_shares(swing);
         let friction = plant.friction();
-        let setup = Setup {
+        Ok(Setup {
             period_s: p.sampling.sampling.period.seconds(),
             counts_per_rev: p.rig.encoder.sensor.counts_per_rev,
             inertia: ends(&bounds.inertia),
@@ -139,9 +156,7 @@ impl Scenario {
             law,
             from_rest: p.run.start == Start::Rest,
             start_volts: self.start_volts(bounds, rate, ripple),
-        };
-        goes_forwards(&setup)?;
-        Ok(setup)
+        })
     }
 
     /// The gains of the law, or the shell within which it stands.

@@ -5,6 +5,7 @@ use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::station::ControllerStation;
 use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
 use clutch_node::ControllerNode;
+use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::{Metrics, Scenario};
 use serde::Serialize;
@@ -65,6 +66,14 @@ pub(crate) fn drive(scenario: &Scenario) -> Outcome<Driven> {
     let report = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?.run(&path)?;
     let ended = report.cause.map(|cause| format!("{cause:?}"));
     Ok(Driven { metrics: report.metrics, largest_error: report.largest_error, ended })
+}
+
+/// Largest departure of friction from its mean that the disc has, as a share.
+pub(crate) fn largest_ripple(hidden: &Scenario) -> Outcome<f64> {
+    let rig = Rig::new(&hidden.params().rig, hidden.params().run.seed)?;
+    let ripple = rig.model.ripple.as_ref();
+    let at = |k: u32| ripple.map_or(0.0, |r| (r.factor(f64::from(k) * 1e-5) - 1.0).abs());
+    Ok((0..628_319).step_by(7).map(at).fold(0.0, f64::max))
 }
 
 /// Rigs that are done are kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
