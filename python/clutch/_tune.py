@@ -324,8 +324,8 @@ class Tuned:
     rates_deg_s : tuple of float
         Rates of the ramp that it was tuned for, °/s; none along another path.
     output_v : tuple of float or None
-        Lowest and highest voltage that a motor's output was limited to, so that it goes forwards alone, V; None where it
-        has the scenario's limits.
+        Lowest and highest voltage that a motor's output was limited to, so that it goes forwards alone, V; None where
+        it has the scenario's limits.
     simulated_s : float
         Simulated time, s.
 
@@ -470,8 +470,8 @@ def tune(
     Parameters
     ----------
     scenario : Scenario, str or path
-        A scenario of the rig. On a ramp smooth means without sticks, and a certificate is looked for; along another path,
-        which may rest and turn round, the error counts, and `uncertified` is needed.
+        A scenario of the rig. On a ramp smooth means without sticks, and a certificate is looked for; along another
+        path, which may rest and turn round, the error counts, and `uncertified` is needed.
     identified : Identified, optional
         The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with its rig's delay and
         ripple.

@@ -6,7 +6,7 @@ mod adversary;
 use adversary::{Adversary, Way};
 use clutch_certificate::{Options, Setup, checker, largest, search, stability};
 use clutch_core::friction::StribeckParams;
-use clutch_core::{BrakeActuator, Servo};
+use clutch_core::{BrakeActuator, MotorActuator, Servo};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::run::simulate_watched;
 use clutch_sim::{Keep, RunSpec, Scenario, simulate_servo};
@@ -38,10 +38,18 @@ fn spec<'a>(scenario: &'a Scenario, setup: &Setup, seed: u64) -> RunSpec<'a> {
     spec.rig.friction = StribeckParams {
         mu_dynamic: sliding,
         mu_static: of(setup.at_rest, 1).max(sliding),
+        stribeck_velocity: setup.stribeck[0],
         ..StribeckParams::default()
     }
     .into();
-    spec.rig.actuator = BrakeActuator { gain: of(setup.brake_gain, 2), ..BrakeActuator::default() }.into();
+    spec.rig.actuator = match &setup.motor {
+        Some(motor) => {
+            // Strong and light, or weak and heavy.
+            spec.rig.inertia = of([setup.inertia[1], setup.inertia[0]], 2);
+            MotorActuator { gain: of(motor.gain, 2), preload: motor.preload, load_share: 0.0 }.into()
+        }
+        None => BrakeActuator { gain: of(setup.brake_gain, 2), ..BrakeActuator::default() }.into(),
+    };
     spec.run.seed = seed;
     spec.run.duration = 2.0;
     spec.run.settle = 0.0;
@@ -102,6 +110,23 @@ fn no_plant_of_a_box_breaks_its_certified_bound() {
                 ("bounds.friction_percent", "5.0"),
             ],
         ),
+        // A motor axis that goes forwards alone, with its load and a tick of delay.
+        (
+            "motor_pid",
+            &[
+                ("reference", "{ramp={rate_deg_s=2.0}}"),
+                ("law", "{pd={kp_v_rad=500.0,kd_v_s_rad=8.0}}"),
+                ("output.lowest_v", "-0.4"),
+                ("output.highest_v", "4.0"),
+                ("velocity.smoothed_derivative.smoothing", "0.5"),
+                ("rig.delay_ticks", "1"),
+                ("model.drive_torque_nm", "-0.002"),
+                ("rig.drive.table.points_s_nm", "[[0.0, -0.002]]"),
+                ("bounds.friction_percent", "5.0"),
+                ("bounds.motor_gain_percent", "3.0"),
+                ("bounds.inertia_percent", "3.0"),
+            ],
+        ),
     ] {
         let scenario = scenario(name, set);
         let setup = setup(&scenario);
@@ -115,6 +140,44 @@ fn no_plant_of_a_box_breaks_its_certified_bound() {
         let most = if name == "pid_2" { 5.0 } else { 3.0 };
         assert!(seen <= bound && bound < most * seen, "{name}: {seen} rad seen, {bound} certified");
     }
+}
+
+/// A law that does its worst with a brake's, or a motor's, voltages.
+fn adversary(spec: &RunSpec<'_>, way: Way, seed: u64) -> Adversary {
+    let [lowest, highest] = [spec.output.lowest, spec.output.highest];
+    let motor = spec.model.actuator.kind().drives_above_0();
+    Adversary { way, seed, lowest, highest, motor, slope: spec.shell.slope }
+}
+
+#[test]
+fn whatever_law_is_within_a_shell_of_a_motor_axis_does_not_break_its_bound() {
+    let scenario = scenario(
+        "motor_pid",
+        &[
+            ("reference", "{ramp={rate_deg_s=2.0}}"),
+            ("output.lowest_v", "-0.5"),
+            ("output.highest_v", "3.0"),
+            ("velocity.smoothed_derivative.smoothing", "0.2"),
+            ("model.friction.stribeck.stribeck_velocity_rad_s", "0.003"),
+            ("bounds.friction_percent", "5.0"),
+            ("shell.slope_1_s", "50.0"),
+            ("shell.boundary_rad_s", "0.2"),
+        ],
+    );
+    let setup = setup(&scenario);
+    let found = search(&setup, &Options { refinements: 0, ..Options::default() }, false);
+    assert!(found.complete(), "{:?}", found.open);
+    let bound = checker::check(&found.certificate).unwrap_or_else(|e| panic!("{e}")).error_bound;
+    let mut worst = 0.0_f64;
+    for seed in 0..63 {
+        let spec = spec(&scenario, &setup, seed);
+        let way = Way::ALL[(seed % 7) as usize];
+        let servo = Servo::with_law(&spec.servo().unwrap(), adversary(&spec, way, seed)).unwrap();
+        let seen = simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad;
+        assert!(seen <= bound, "{way:?}, seed {seed}: {seen} rad seen, {bound} certified");
+        worst = worst.max(seen);
+    }
+    assert!(bound < 2.5 * worst, "{worst} rad seen, {bound} certified");
 }
 
 #[test]
@@ -145,8 +208,7 @@ fn whatever_law_is_within_a_shell_does_not_break_its_bound() {
             let mut spec = spec(&scenario, &setup, seed);
             spec.run.duration = 1.5;
             let way = Way::ALL[(seed % 7) as usize];
-            let law = Adversary { way, seed, highest: spec.output.highest, slope: spec.shell.slope };
-            let servo = Servo::with_law(&spec.servo().unwrap(), law).unwrap();
+            let servo = Servo::with_law(&spec.servo().unwrap(), adversary(&spec, way, seed)).unwrap();
             let seen = simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad;
             assert!(seen <= bound, "{slope} 1/s, {way:?}, seed {seed}: {seen} rad seen, {bound} certified");
             worst = worst.max(seen);
@@ -155,8 +217,7 @@ fn whatever_law_is_within_a_shell_does_not_break_its_bound() {
         // Without the shell the worst law does not stay near.
         let mut spec = spec(&scenario, &setup, 0);
         spec.shell.boundary = 0.0;
-        let law = Adversary { way: Way::Nothing, seed: 0, highest: 10.0, slope: 100.0 };
-        let servo = Servo::with_law(&spec.servo().unwrap(), law).unwrap();
+        let servo = Servo::with_law(&spec.servo().unwrap(), adversary(&spec, Way::Nothing, 0)).unwrap();
         let run = simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED).unwrap();
         assert!(run.metrics.max_error_rad > 100.0 * bound);
     }
@@ -176,6 +237,22 @@ fn what_the_sampled_certificate_does_not_cover_is_said_by_name() {
     let fed = scenario("pid_2", &[("law.pid.ki_v_rad_s", "0.0"), ("law.pid.bias_v", "20.0")]);
     let why = fed.sampled_setup(&fed.plan().unwrap().bounds).unwrap_err().to_string();
     assert!(why.contains("a feed-forward beyond the output's limits (law.pid)"), "{why}");
+    let ramp = ("reference", "{ramp={rate_deg_s=2.0}}");
+    for (set, said) in [
+        (
+            &[ramp][..],
+            "-10 V at a motor, which may turn the shaft round: friction surely holds it from -0.597 V on",
+        ),
+        (
+            &[ramp, ("model.actuator.motor.load_share", "0.1"), ("rig.actuator.motor.load_share", "0.1")],
+            "load_share",
+        ),
+        (&[ramp, ("law", "{smc={}}"), ("output.lowest_v", "-0.3")], "SMC (31)"),
+    ] {
+        let motor = scenario("motor_pid", set);
+        let why = motor.sampled_setup(&motor.plan().unwrap().bounds).unwrap_err().to_string();
+        assert!(why.contains(said), "{why}");
+    }
     let delayed = scenario("pd_2", &[("rig.delay_ticks", "4")]);
     assert!(
         delayed.sampled_setup(&delayed.plan().unwrap().bounds).unwrap_err().to_string().contains("4 ticks")
