@@ -266,7 +266,8 @@ class Candidate:
         The gains that were varied, by their dotted keys, SI.
     cost : float or None
         On a ramp cycles/s + 30 × RMS error in degrees + longest stick over 20 ms; along another path 30 × RMS error +
-        10 × largest error in degrees. On the worst of all runs; None if it left its path.
+        10 × largest error in degrees; and a thousandth of the voltage's V/s. On the worst of all runs; None if it left
+        its path.
     cycles_per_s : float
         Stick-slip cycles a second, in the worst run.
     max_error_rad : float

@@ -67,9 +67,11 @@ pub struct Setup {
     pub start_volts: Ends,
 }
 
-/// Share of the path's velocity at which slow speeds of a motor axis end. Of shares from 0.01 to 0.5 the bounds of docs/certified.md were
-/// least with 0.01 to 0.06, whatever the Stribeck velocity was; from 0.5 on some did not close.
-const OF_THE_PATH: f64 = 0.03;
+/// Share of the path's velocity at which slow speeds of a motor axis end at most. Of shares from 0.01 to 0.5 the bounds of
+/// docs/certified.md were least with 0.01 to 0.06, whatever the Stribeck velocity was; from 0.5 on some did not close.
+const OF_A_MOTOR: f64 = 0.03;
+/// The same in a shell around a brake: of shares from 0.04 to 0.2 it gave the least bounds, and two rigs of docs/tune.md theirs.
+const IN_A_SHELL: f64 = 0.04;
 
 impl Gains {
     /// `true` if the law remembers an integral.
@@ -115,15 +117,17 @@ impl Setup {
     }
 
     /// Exponent of Stribeck's curve, (2), at which its slow speeds end: what is left of it there, `e` to the power of minus this,
-    /// counts as friction at every speed. Within a shell any voltage may come, and narrow slow speeds are worth more than
-    /// a narrow friction. Friction of a motor axis does not grow with the voltage, so that a wide one costs little there: its slow
-    /// speeds end far below the path's.
+    /// counts as friction at every speed. Within a shell any voltage may come, and friction of a motor axis does not grow with
+    /// the voltage: there narrow slow speeds are worth more than a narrow friction, and end far below the path's.
     #[must_use]
     pub fn slow_exponent(&self) -> f64 {
         let usual = if matches!(self.law, Gains::Shell { .. }) { 2.0 } else { 7.0 };
-        match self.motor {
-            Some(_) => libm::pow(OF_THE_PATH * self.rate / self.stribeck[0], self.stribeck[1]).min(usual),
-            None => usual,
+        let narrow =
+            |share: f64| libm::pow(share * self.rate / self.stribeck[0], self.stribeck[1]).min(usual);
+        match (self.motor, self.law) {
+            (Some(_), _) => narrow(OF_A_MOTOR),
+            (None, Gains::Shell { .. }) => narrow(IN_A_SHELL),
+            _ => usual,
         }
     }
 

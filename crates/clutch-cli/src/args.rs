@@ -37,15 +37,24 @@ impl ScenarioArgs {
         let (mut origin, text) = Scenario::text(&self.scenario)?;
         // A scenario that is no TOML says so itself.
         let Ok(mut table) = text.parse::<Table>() else { return Ok(Scenario::parse(&origin, &text, &[])?) };
-        if let Some(file) = &self.identified {
-            read_rig_file(file)?.put_into(&mut table);
+        let rig = self.identified.as_deref().map(read_rig_file).transpose()?;
+        if let (Some(file), Some(rig)) = (&self.identified, &rig) {
+            rig.put_into(&mut table);
             origin += &format!(" with {}", file.display());
         }
         if let Some(file) = &self.map {
             table.insert(MAP.to_owned(), read_map(file)?);
             origin += &format!(" with {}", file.display());
         }
-        Ok(Scenario::parse(&origin, &table.to_string(), &self.set)?)
+        let scenario = Scenario::parse(&origin, &table.to_string(), &self.set)?;
+        let kind = scenario.spec().rig.actuator.kind();
+        if let (Some(file), Some(rig)) = (&self.identified, &rig)
+            && rig.kind() != kind
+        {
+            let (file, of, kind) = (file.display(), rig.kind().name(), kind.name());
+            anyhow::bail!("rig.actuator = {kind}: expected a {of}, as {file} was identified with");
+        }
+        Ok(scenario)
     }
 }
 

@@ -127,9 +127,9 @@ impl Words {
             },
             ActuatorKind::Motor => Words {
                 given: "voltage given (nearer limit)",
-                ahead: "\nShaft ahead: the motor drives it back (worst corner: weakest motor, all against it)",
+                ahead: "\nShaft ahead: the motor drives it back (worst: weakest motor, all against it)",
                 gain: "worst corner: torque per volt",
-                behind: "\nShaft behind: the motor drives it on (worst corner: weakest motor, all against it)",
+                behind: "\nShaft behind: the motor drives it on (worst: weakest motor, all against it)",
             },
         }
     }

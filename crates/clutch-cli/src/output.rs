@@ -190,7 +190,13 @@ pub(crate) fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -
     let bar = if quiet() { ProgressBar::hidden() } else { ProgressBar::no_length() };
     let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let result = work(&|p| {
-        bar.set_length(p.total);
+        // Work that comes in parts tells the total of each as it begins; a run within one tells none.
+        if p.total > 0 {
+            if p.finished == 0 && bar.position() > 0 {
+                bar.set_position(0);
+            }
+            bar.set_length(p.total);
+        }
         bar.inc(p.finished);
         ControlFlow::Continue(())
     });

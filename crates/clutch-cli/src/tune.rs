@@ -133,11 +133,18 @@ fn nothing(tuned: &Tuned) -> String {
             c.name,
             lost(c)
         ),
-        (Some(c), ..) | (None, None, Some(c)) => format!(
-            "no gains are given out: {}: {}; a higher rate may help, or a finer encoder (clutch map)",
-            c.name,
-            lost(c)
-        ),
+        (Some(c), ..) | (None, None, Some(c)) => {
+            let output = if tuned.output_v.is_some() {
+                ", or --uncertified, which leaves output.lowest_v and highest_v as they are"
+            } else {
+                ""
+            };
+            format!(
+                "no gains are given out: {}: {}; a higher rate may help, or a finer encoder (clutch map){output}",
+                c.name,
+                lost(c)
+            )
+        }
         (None, None, None) => {
             "no gains are given out: no law goes with the path on every corner of the bounds".to_owned()
         }
@@ -197,12 +204,12 @@ fn about(tuned: &Tuned) -> String {
         (
             "Along the scenario's path".to_owned(),
             "run.settle_s",
-            "30 × RMS error, ° + 10 × largest error, °: where a path turns round every shaft rests, and sticks do not count",
+            "30 × RMS error, ° + 10 × largest error, ° + V/s over 1000: where a path turns round every shaft rests, and sticks do not count",
         )
     } else {
         let rates: Vec<String> = tuned.rates_deg_s.iter().map(|r| number(*r)).collect();
         let at = format!("At {} °/s", rates.join(", "));
-        (at, "the first second", "cycles/s + 30 × RMS error, ° + longest stick/20 ms")
+        (at, "the first second", "cycles/s + 30 × RMS error, ° + longest stick/20 ms + V/s over 1000")
     };
     format!(
         "{at}, from rest, {corners}; figures are the worst of runs on discs 101 to 108, {settling} left out. Cost: {cost}. {:.0} s \

@@ -385,7 +385,7 @@ fn errors_fit_a_terminal_and_are_for_a_program_as_they_were() {
         "loop --fault Freeze:at=1",
         "loop --port tcp://nowhere --update-rate 3",
         "hil --image none.elf --fault reset:at=1 --chip-fault hang:at=1",
-        "tune minimum_jerk",
+        "tune minimum_jerk --rates 2",
         "identify --port /dev/none --log logs",
         "log info mine.toml",
     ] {
@@ -728,8 +728,50 @@ fn tuning_prints_who_lost_and_why_in_80_columns_and_writes_what_the_other_verbs_
     assert_eq!(o.status.code(), Some(2), "{}", out(&o));
     assert!(out(&o).contains("no gains are given out") && out(&o).contains("--uncertified"), "{}", out(&o));
     assert!(err(&o).contains("not written"), "{}", err(&o));
-    let o = clutch(&["tune", "minimum_jerk"]);
-    assert!(err(&o).contains("reference") && err(&o).contains("a ramp"), "{}", err(&o));
+    let o = clutch(&["tune", "minimum_jerk", "--rates", "2"]);
+    assert!(err(&o).contains("rates = 2: expected none, as [reference.minimum_jerk]"), "{}", err(&o));
+}
+
+#[test]
+fn a_motor_axis_is_tuned_and_its_proof_and_its_voltages_go_with_it() {
+    let dir = folder("tune_motor");
+    let file = |name: &str| dir.join(name).to_str().unwrap().to_owned();
+    let (tuned, proof, brake) = (file("tuned.toml"), file("proof.json"), file("brake.toml"));
+    let ramp = ["--set", "reference={ramp={rate_deg_s=2.0}}", "--candidates", "2"];
+    let o = clutch(&[&["tune", "motor_pid"][..], &ramp, &["--out", &tuned, "--save", &proof]].concat());
+    let text = out(&o);
+    assert!(o.status.success() && narrow(&text), "{}{text}", err(&o));
+    let flat = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in ["output.lowest_v = -0.597", "output.highest_v = 3", "k_t 0.05 N m/V", "volts -0.597 … 3"]
+    {
+        assert!(flat.contains(words), "lacks {words}:\n{text}");
+    }
+    let checked = clutch(&["certify", &tuned, "--check", &proof]);
+    assert!(checked.status.success(), "{}{}", out(&checked), err(&checked));
+    let told = out(&checked).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("|e| stays below"), "{told}");
+    // Another output is another loop.
+    let wide = clutch(&["certify", &tuned, "--check", &proof, "--set", "output.highest_v=2.5"]);
+    assert!(!wide.status.success(), "{}", out(&wide));
+    // A brake's rig file is none of a motor, and the other way round.
+    let o = clutch(&["identify", "board_smc_2", "--out", &brake]);
+    assert!(o.status.success(), "{}", err(&o));
+    for verb in ["tune", "certify", "sim"] {
+        let o = clutch(&[verb, "motor_pid", "--identified", &brake]);
+        assert!(err(&o).contains("rig.actuator = motor: expected a brake, as"), "{verb}: {}", err(&o));
+    }
+    // Along its own path nothing is certified, and the reason is told once.
+    let o = clutch(&["tune", "motor_pid", "--candidates", "1", "--set", "run.duration_s=4"]);
+    let text = out(&o);
+    assert_eq!(o.status.code(), Some(2), "{text}");
+    let flat = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        flat.contains(
+            "no law is certified here: the sampled-data certificate does not cover a path that is no ramp"
+        ),
+        "{text}"
+    );
+    assert!(flat.contains("sticks do not count") && narrow(&text), "{text}");
 }
 
 #[test]

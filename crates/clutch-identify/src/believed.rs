@@ -76,6 +76,13 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     if kind == ActuatorKind::Both {
         return refuse("rig.actuator", kind.name(), "a brake or a motor, which can be identified and tuned");
     }
+    if let Some(other) = file.map(RigFile::kind).filter(|other| *other != kind) {
+        return refuse(
+            "rig.actuator",
+            kind.name(),
+            &format!("a {}, as the rig file was identified with", other.name()),
+        );
+    }
     let mut table = scenario.table().clone();
     // Trials run on other discs.
     let _ = table.remove("friction_map");
@@ -97,9 +104,16 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     // A bound for one Stribeck velocity holds for all below it: the slow speeds are those of the largest.
     if let (Some(file), FrictionParams::Stribeck(_)) = (file, spec.model.friction) {
         let most = file.stribeck.map_or(UNKNOWN_STRIBECK, |stribeck| stribeck.high);
-        for section in ["model", "rig"] {
+        let tried = match file.stribeck {
+            // A motor's is rarely known but for its upper end, at which every law would be judged by a shaft that hardly is one.
+            Some(v) if kind == ActuatorKind::Motor && v.low <= 0.0 && v.value > 0.0 => {
+                (v.value * v.high).sqrt()
+            }
+            _ => most,
+        };
+        for (section, velocity) in [("model", most), ("rig", tried)] {
             let key = format!("{section}.friction.stribeck.stribeck_velocity_rad_s");
-            set.push((key, Value::Float(most)));
+            set.push((key, Value::Float(velocity)));
         }
     }
     if let Some(delay) = file.and_then(|file| file.delay) {

@@ -3,7 +3,7 @@
 use crate::Estimate;
 use crate::report::{Finding, Report};
 use crate::shown::{ROWS, Row};
-use clutch_core::Actuator;
+use clutch_core::{Actuator, ActuatorKind};
 use clutch_sim::Scenario;
 use toml::{Table, Value};
 
@@ -150,6 +150,13 @@ impl RigFile {
             ripple: told("ripple_rms"),
             stribeck: told("stribeck_velocity_rad_s"),
         })
+    }
+
+    /// Kind of the actuator that it was identified with.
+    #[must_use]
+    pub fn kind(&self) -> ActuatorKind {
+        let motor = self.model.get("actuator").and_then(|actuator| actuator.get("motor")).is_some();
+        if motor { ActuatorKind::Motor } else { ActuatorKind::Brake }
     }
 
     /// Puts model and bounds into a scenario's table, key by key.

@@ -52,6 +52,8 @@ const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
 const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
 const JUDGING: std::ops::RangeInclusive<u64> = 101..=108;
 const ACCEPTING: std::ops::RangeInclusive<u64> = 201..=210;
+/// Least time behind the settling time along a path that is no ramp, s.
+const LEAST_S: f64 = 1.0;
 /// Lengths of their runs on a ramp, s; along another path they are as long as the scenario's.
 const SHORT_S: f64 = 2.0;
 const LONG_S: f64 = 4.0;
@@ -219,7 +221,14 @@ fn rates(scenario: &Scenario, options: &Options) -> Result<Vec<f64>, ScenarioErr
         _ => {}
     }
     if let Some(bad) = rates.iter().find(|rate| !(rate.is_finite() && **rate > 0.0)) {
-        return wrong("rates", &bad.to_string(), "finite numbers above 0 °/s");
+        // Its own rate stands in the scenario.
+        let key = if options.rates_deg_s.is_empty() { RATE } else { "rates" };
+        return wrong(key, &bad.to_string(), "finite numbers above 0 °/s: tuning is for ramps forwards");
+    }
+    let run = scenario.params().run;
+    if rates.is_empty() && run.duration - run.settle < LEAST_S {
+        let expected = format!("at least run.settle_s + {LEAST_S} s, along which errors are taken");
+        return wrong("run.duration_s", &run.duration.to_string(), &expected);
     }
     rates.sort_by(f64::total_cmp);
     rates.dedup();

@@ -29,6 +29,8 @@ const FAR: f64 = 0.5;
 const PER_DEGREE: f64 = 30.0;
 /// Weight of the longest stick, cycles/s per second.
 const PER_SECOND: f64 = 50.0;
+/// Weight of the voltage's variation, cycles/s per V/s: a law that chatters is not smooth.
+const PER_VOLT_PER_SECOND: f64 = 1e-3;
 /// Weight of the largest error along a path that is no ramp, per degree.
 const PER_DEGREE_AT_MOST: f64 = 10.0;
 
@@ -36,7 +38,7 @@ const PER_DEGREE_AT_MOST: f64 = 10.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
     /// On a ramp cycles/s + 30 × RMS error in degrees + longest stick over 20 ms; along another path, which may rest and turn
-    /// round, 30 × RMS error + 10 × largest error in degrees. Of the run where this sum is largest; none if a run left its path.
+    /// round, 30 × RMS error + 10 × largest error in degrees; and a thousandth of the voltage's V/s. Of the run where this sum is largest; none if a run left its path.
     pub cost: Option<f64>,
     /// Stick-slip cycles a second.
     pub cycles_per_s: f64,
@@ -146,7 +148,8 @@ fn run(
         // Where a path turns round every shaft rests: the error alone tells what that costs.
         None => PER_DEGREE_AT_MOST * m.max_error_rad.to_degrees(),
     };
-    let cost = roughness + PER_DEGREE * m.rms_error_rad.to_degrees();
+    let chatter = PER_VOLT_PER_SECOND * m.control_variation_v_s;
+    let cost = roughness + chatter + PER_DEGREE * m.rms_error_rad.to_degrees();
     let follows = m.max_error_rad < FAR && cost.is_finite();
     Ok(Score {
         cost: follows.then_some(cost),

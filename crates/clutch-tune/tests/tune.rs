@@ -90,6 +90,11 @@ fn mistakes_are_named_by_key_value_and_expectation() {
     };
     let rates = |rates: &[f64]| Options { rates_deg_s: rates.to_vec(), ..few() };
     assert!(refusal(&[], rates(&[2.0, -1.0])).contains("rates = -1: expected finite numbers above 0 °/s"));
+    let rests = refusal(&[("reference.ramp.rate_deg_s", "0.0")], few());
+    assert!(rests.contains("reference.ramp.rate_deg_s = 0: expected finite numbers above 0 °/s"), "{rests}");
+    let short = [("run.duration_s", "2.5"), ("run.settle_s", "2.0")];
+    let short = tune(&motor(&short), None, &few(), UNWATCHED).unwrap_err().to_string();
+    assert!(short.contains("run.duration_s = 2.5: expected at least run.settle_s + 1 s"), "{short}");
     let none = refusal(&[], Options { candidates: 0, ..few() });
     assert!(none.contains("candidates = 0: expected a whole number from 1 to 10000"), "{none}");
     let to_and_fro = tune(&motor(&[]), None, &rates(&[2.0]), UNWATCHED).unwrap_err().to_string();
@@ -162,7 +167,7 @@ fn along_a_path_that_turns_round_the_error_decides_and_nothing_is_certified() {
     let set = [("run.duration_s", "6.0"), ("run.settle_s", "1.0")];
     let found = tune(&motor(&set), None, &few(), UNWATCHED).unwrap();
     assert!(found.winner().is_none() && found.rates_deg_s.is_empty() && found.output_v.is_none());
-    assert!(found.uncovered.as_ref().unwrap().contains("a path that accelerates"), "{:?}", found.uncovered);
+    assert!(found.uncovered.as_ref().unwrap().contains("a path that is no ramp"), "{:?}", found.uncovered);
     assert!(found.candidates.iter().any(|c| c.name == "glide with micro-steps"), "{:?}", found.candidates);
     let found = tune(&motor(&set), None, &Options { uncertified: true, ..few() }, UNWATCHED).unwrap();
     let winner = found.winner().expect("a winner");

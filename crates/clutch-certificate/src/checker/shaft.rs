@@ -210,7 +210,7 @@ impl Shaft {
 
     /// Most counts that go by from one sample to the next.
     pub(crate) fn most_counts(&self) -> Option<u32> {
-        let most = (at(self.cap) + self.drives.1 + self.slow).high.ceil();
+        let most = (at(self.cap) + self.drives.1.max(self.drives_anywhere.1) + self.slow).high.ceil();
         (most <= 1e6).then_some(most as u32)
     }
 }

@@ -66,11 +66,16 @@ fn goes_forwards(s: &Setup) -> Result<(), NotCovered> {
     match turns_below(s) {
         Some(limit) if s.volts[0].min(s.start_volts[0]) < limit => Err(not(
             "output.lowest_v",
-            format!(
-                "{} V at a motor, which may turn the shaft round: friction surely holds it from {:.3} V on",
-                s.volts[0],
-                (1e3 * limit).ceil() / 1e3
-            ),
+            if limit < 0.0 {
+                let from = (1e3 * limit).ceil() / 1e3;
+                let volts = s.volts[0];
+                format!(
+                    "{volts} V at a motor, which may turn the shaft round: friction surely holds it from {from} V on"
+                )
+            } else {
+                "a load that friction may not hold, so that any lowest voltage may turn the shaft round"
+                    .to_owned()
+            },
             "motors that go forwards alone",
         )),
         _ => Ok(()),
@@ -198,7 +203,7 @@ impl Scenario {
             return Err(not("velocity", source, "smoothed_derivative, the difference (5)"));
         };
         let ReferenceParams::Ramp(ramp) = p.reference else {
-            return Err(not("reference", "a path that accelerates", "ramps"));
+            return Err(not("reference", "a path that is no ramp", "ramps"));
         };
         if ramp.rate <= 0.0 {
             return Err(not("reference.ramp.rate_deg_s", "a path that rests", "ramps forwards"));

@@ -185,8 +185,10 @@ impl Sampled {
                 let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
                 let [weak, middle, strong] = radii.map(|s| s.radius);
                 let law = if self.any_law() { "the law within the shell is " } else { "" };
+                let motor = self.setup.as_ref().is_ok_and(|s| s.motor.is_some());
+                let of = if motor { "motor" } else { "brake" };
                 format!(
-                    "{law}{verdict}: spectral radius {weak:.3}, {middle:.3}, {strong:.3} with the weakest, a middle and the strongest brake, while nothing saturates or sticks"
+                    "{law}{verdict}: spectral radius {weak:.3}, {middle:.3}, {strong:.3} with the weakest, a middle and the strongest {of}, while nothing saturates or sticks"
                 )
             }
             (None, Err(why)) => why.to_string(),
