@@ -3,7 +3,7 @@
 use anyhow::{Context, bail};
 use clap::Args;
 use clutch_identify::RigFile;
-use clutch_sim::Scenario;
+use clutch_sim::{Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -48,11 +48,8 @@ impl ScenarioArgs {
         }
         let scenario = Scenario::parse(&origin, &table.to_string(), &self.set)?;
         let kind = scenario.spec().rig.actuator.kind();
-        if let (Some(file), Some(rig)) = (&self.identified, &rig)
-            && rig.kind() != kind
-        {
-            let (file, of, kind) = (file.display(), rig.kind().name(), kind.name());
-            anyhow::bail!("rig.actuator = {kind}: expected a {of}, as {file} was identified with");
+        if let Some(expected) = rig.and_then(|rig| rig.expects_other_than(kind)) {
+            return Err(ScenarioError::value(scenario.name(), "rig.actuator", kind.name(), &expected).into());
         }
         Ok(scenario)
     }

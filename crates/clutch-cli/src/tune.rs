@@ -270,9 +270,8 @@ fn text(tuned: &Tuned) -> String {
         if winner.gains.is_empty() {
             out += "  the scenario's own gains, or the law's defaults\n";
         }
-        if let Some([lowest, highest]) = tuned.output_v {
-            out += &format!("  output.lowest_v = {}\n", number(lowest));
-            out += &format!("  output.highest_v = {}\n", number(highest));
+        for (key, volts) in tuned.output_limits() {
+            out += &format!("  {key} = {}\n", number(volts));
         }
         if let Some(s) = &tuned.from_rest {
             let (at, sticks) = match tuned.rates_deg_s.first() {
@@ -358,11 +357,9 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
     });
     let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let gains = tuned.winner().map_or(&[][..], |winner| &winner.gains);
-    let output = tuned.output_v.into_iter().flat_map(|[lowest, highest]| {
-        [("output.lowest_v".to_owned(), lowest), ("output.highest_v".to_owned(), highest)]
-    });
-    let output: Vec<(String, f64)> = output.collect();
-    let gains = gains.iter().chain(&output).map(|(key, value)| vec![key.clone(), number(*value)]);
+    let row = |key: &str, value: f64| vec![key.to_owned(), number(value)];
+    let output = tuned.output_limits().map(|(key, volts)| row(key, volts));
+    let gains = gains.iter().map(|(key, value)| row(key, *value)).chain(output);
     let table = |id: &str, title: &str, caption: &str, rows, words| ReportTable {
         id: id.to_owned(),
         title: title.to_owned(),

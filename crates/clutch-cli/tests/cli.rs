@@ -758,7 +758,11 @@ fn a_motor_axis_is_tuned_and_its_proof_and_its_voltages_go_with_it() {
     assert!(o.status.success(), "{}", err(&o));
     for verb in ["tune", "certify", "sim"] {
         let o = clutch(&[verb, "motor_pid", "--identified", &brake]);
-        assert!(err(&o).contains("rig.actuator = motor: expected a brake, as"), "{verb}: {}", err(&o));
+        assert!(
+            err(&o).contains("rig.actuator = motor: expected a brake, as the rig file was identified with"),
+            "{verb}: {}",
+            err(&o)
+        );
     }
     // Along its own path nothing is certified, and the reason is told once.
     let o = clutch(&["tune", "motor_pid", "--candidates", "1", "--set", "run.duration_s=4"]);

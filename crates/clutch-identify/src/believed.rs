@@ -76,12 +76,8 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     if kind == ActuatorKind::Both {
         return refuse("rig.actuator", kind.name(), "a brake or a motor, which can be identified and tuned");
     }
-    if let Some(other) = file.map(RigFile::kind).filter(|other| *other != kind) {
-        return refuse(
-            "rig.actuator",
-            kind.name(),
-            &format!("a {}, as the rig file was identified with", other.name()),
-        );
+    if let Some(expected) = file.and_then(|file| file.expects_other_than(kind)) {
+        return refuse("rig.actuator", kind.name(), &expected);
     }
     let mut table = scenario.table().clone();
     // Trials run on other discs.

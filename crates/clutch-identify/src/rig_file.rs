@@ -152,11 +152,12 @@ impl RigFile {
         })
     }
 
-    /// Kind of the actuator that it was identified with.
+    /// The actuator that `rig.actuator` has to be, in words, where it is of another kind than the one that was identified.
     #[must_use]
-    pub fn kind(&self) -> ActuatorKind {
+    pub fn expects_other_than(&self, kind: ActuatorKind) -> Option<String> {
         let motor = self.model.get("actuator").and_then(|actuator| actuator.get("motor")).is_some();
-        if motor { ActuatorKind::Motor } else { ActuatorKind::Brake }
+        let own = if motor { ActuatorKind::Motor } else { ActuatorKind::Brake };
+        (own != kind).then(|| format!("a {}, as the rig file was identified with", own.name()))
     }
 
     /// Puts model and bounds into a scenario's table, key by key.

@@ -159,6 +159,11 @@ pub struct Tuned {
 }
 
 impl Tuned {
+    /// [`Tuned::output_v`] by the keys of a scenario; none where it has its own limits.
+    pub fn output_limits(&self) -> impl Iterator<Item = (&'static str, f64)> + use<> {
+        self.output_v.into_iter().flat_map(output_keys)
+    }
+
     /// The candidate that is chosen.
     #[must_use]
     pub fn winner(&self) -> Option<&Candidate> {
@@ -168,8 +173,8 @@ impl Tuned {
 
 /// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified:
 /// at rates of a ramp, or along the scenario's path where that is no ramp, which has no certificate yet. On a ramp a motor gets
-/// limits of its output at which it goes forwards alone, as its certificate asks. `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes
-/// again, on any number of cores. `report` gets each run.
+/// limits of its output at which it goes forwards alone, as its certificate asks. `file` is what was identified; without it
+/// corners, delay and ripple are the scenario's. The same comes again, on any number of cores. `report` gets each run.
 ///
 /// # Errors
 /// A rig with brake and motor on one signal, rates for a path that is no ramp, an option out of range; the end of `report`'s
@@ -540,6 +545,11 @@ fn any_inner(base: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
     inner.map(|family| family.scenario(base, &Gains::new())).transpose()
 }
 
+/// Limits of an output by their keys, V.
+fn output_keys([lowest, highest]: [f64; 2]) -> [(&'static str, f64); 2] {
+    [("output.lowest_v", lowest), ("output.highest_v", highest)]
+}
+
 /// A motor on a ramp with an output that cannot turn it round, which is what a certificate of a motor axis asks for: its lowest voltage
 /// is what friction surely holds, its highest some times what friction at rest takes. Other scenarios are as they are.
 fn forwards(base: &Scenario) -> Result<(Scenario, Option<[f64; 2]>), ScenarioError> {
@@ -557,10 +567,7 @@ fn forwards(base: &Scenario) -> Result<(Scenario, Option<[f64; 2]>), ScenarioErr
     if lowest >= 0.0 || (lowest <= output.lowest && highest >= output.highest) {
         return as_it_is();
     }
-    let set = [
-        ("output.lowest_v".to_owned(), Value::Float(lowest)),
-        ("output.highest_v".to_owned(), Value::Float(highest)),
-    ];
+    let set = output_keys([lowest, highest]).map(|(key, volts)| (key.to_owned(), Value::Float(volts)));
     let limited = Scenario::from_table(base.name(), base.table().clone(), &set)?;
     Ok((limited, Some([lowest, highest])))
 }
