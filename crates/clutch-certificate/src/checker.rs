@@ -402,6 +402,12 @@ fn shape(cell: &Cell, n: usize) -> Result<(), Flaw> {
     if !(cell.speed_cap > 0.0 && cell.speed_cap <= 1e4) {
         return no(format!("speed_cap is {}: expected a number above 0, up to 10000", cell.speed_cap));
     }
+    if !(cell.slow_exponent > 0.0 && cell.slow_exponent <= 100.0) {
+        return no(format!(
+            "slow_exponent is {}: expected a number above 0, up to 100",
+            cell.slow_exponent
+        ));
+    }
     Ok(())
 }
 

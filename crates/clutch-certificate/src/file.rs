@@ -42,7 +42,7 @@ pub enum FileError {
         size: u64,
     },
     /// The format has another version.
-    #[error("{name}: version is {version}: expected {VERSION}")]
+    #[error("{name}: version is {version}: expected {VERSION}; look for the proof anew")]
     Version {
         /// The file.
         name: String,

@@ -348,7 +348,8 @@ mod tests {
         next: &mut dyn FnMut(f64, f64) -> f64,
         seen: &mut [i32; 4],
     ) {
-        let u = Units::new(&ordered(setup), setup.sliding, 3.0);
+        let slow = setup.slow_exponents()[0];
+        let u = Units::new(&ordered(setup), setup.sliding, slow, 3.0);
         let law = u.law;
         let modes: Vec<Mode<N>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);
         for _ in 0..400 {

@@ -237,7 +237,7 @@ fn kinks(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::setup::Setup;
+    use crate::setup::{Setup, USUAL_END};
     use crate::tests::uniform;
 
     /// (4) and (31) as the paper writes them, with the limits.
@@ -293,7 +293,7 @@ pub(crate) mod tests {
             Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];
         for law in laws {
-            let u = Units::new(&Setup::paper(law), [0.15; 2], 2.0);
+            let u = Units::new(&Setup::paper(law), [0.15; 2], USUAL_END, 2.0);
             let pieces = pieces(&u, &strips(&law, u.volts));
             let mut next = uniform(7);
             for _ in 0..20_000 {

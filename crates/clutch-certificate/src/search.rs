@@ -6,7 +6,7 @@ use crate::invariant::{Effort, Open, Search};
 use crate::modes::{Mode, modes};
 use crate::pieces::{pieces, strips};
 use crate::rows::{Fineness, rows};
-use crate::setup::{Cell, Certificate, Contradiction, Ends, Form, Gains, Proof, Setup, VERSION};
+use crate::setup::{Cell, Certificate, Contradiction, Ends, Form, Gains, Proof, Setup, USUAL_END, VERSION};
 use crate::units::{LAW_ROUNDING, TARGET_STEP, Units};
 
 /// Effort of a certificate.
@@ -155,7 +155,7 @@ const USUAL_COUNTS: f64 = 4.0;
 
 /// The attempt that is worth its time where a bound is far above the steady error.
 fn second(setup: &Setup, bound: f64) -> Option<(Form, (Fineness, f64))> {
-    let u = Units::new(setup, setup.sliding, 0.0);
+    let u = Units::new(setup, setup.sliding, USUAL_END, 0.0);
     let count = u.count;
     let holds = match &setup.motor {
         Some(motor) => {
@@ -185,8 +185,11 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
         // (31) has hundreds of modes, times the counts of the exact form.
         Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
     };
-    let tried = |(form, (fineness, growth)): &(Form, (Fineness, f64))| {
-        let cell = attempt(setup, sliding, *form, *fineness, *growth, options)?;
+    let slow = setup.slow_exponents();
+    let quick = slow[0];
+    let slow = if options.patient { &slow[..] } else { &slow[..1] };
+    let tried = |slow: f64, (form, (fineness, growth)): (Form, (Fineness, f64))| {
+        let cell = attempt(&Parts { setup, sliding, slow, form, fineness, growth, options })?;
         // A cell that rounding has spoilt proves nothing.
         let alone =
             Certificate { version: VERSION, setup: Setup { sliding, ..setup.clone() }, cells: vec![cell] };
@@ -195,11 +198,10 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
         }
         alone.cells.into_iter().next().ok_or(Open::Slow)
     };
-    let found: Vec<Result<Cell, Open>> = first.iter().map(tried).collect();
     let mut open = Open::Slow;
     let mut best: Option<Cell> = None;
-    for result in found.into_iter() {
-        match result {
+    for (slow, how) in slow.iter().flat_map(|slow| first.iter().map(move |how| (*slow, *how))) {
+        match tried(slow, how) {
             Ok(cell) if best.as_ref().is_none_or(|best| cell.error_bound < best.error_bound) => {
                 best = Some(cell)
             }
@@ -208,14 +210,14 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
         }
     }
     if let Some(best) = best {
-        let again = second(setup, best.error_bound).map(|attempt| tried(&attempt));
+        let again = second(setup, best.error_bound).map(|how| tried(quick, how));
         return Ok(match again {
             Some(Ok(cell)) if cell.error_bound < best.error_bound => cell,
             _ => best,
         });
     }
-    for attempt in later {
-        match tried(attempt) {
+    for how in later {
+        match tried(quick, *how) {
             Ok(cell) => return Ok(cell),
             Err(why) => open = why,
         }
@@ -223,17 +225,10 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     Err(open)
 }
 
-/// One attempt, with one form and fineness.
-pub(crate) fn attempt(
-    setup: &Setup,
-    sliding: Ends,
-    form: Form,
-    fineness: Fineness,
-    growth: f64,
-    options: &Options,
-) -> Result<Cell, Open> {
+/// One attempt.
+fn attempt(parts: &Parts<'_>) -> Result<Cell, Open> {
     let tried = |f: &dyn Fn(f64) -> Result<Cell, (Open, f64)>| {
-        let units = Units::new(setup, sliding, 0.0);
+        let units = Units::new(parts.setup, parts.sliding, parts.slow, 0.0);
         let mut cap = 1.3 * units.path + 0.8;
         for _ in 0..3 {
             match f(cap) {
@@ -243,20 +238,21 @@ pub(crate) fn attempt(
         }
         Err(Open::Grows)
     };
-    let parts = Parts { setup, sliding, form, fineness, growth, options };
-    tried(&|cap| match setup.dimension() {
-        4 => with_cap::<4>(&parts, cap),
-        5 => with_cap::<5>(&parts, cap),
-        6 => with_cap::<6>(&parts, cap),
-        7 => with_cap::<7>(&parts, cap),
-        8 => with_cap::<8>(&parts, cap),
+    tried(&|cap| match parts.setup.dimension() {
+        4 => with_cap::<4>(parts, cap),
+        5 => with_cap::<5>(parts, cap),
+        6 => with_cap::<6>(parts, cap),
+        7 => with_cap::<7>(parts, cap),
+        8 => with_cap::<8>(parts, cap),
         _ => Err((Open::Slow, 0.0)),
     })
 }
 
+/// What an attempt is made of: a part of the box, an end of slow speeds, and form and fineness of the set.
 struct Parts<'a> {
     setup: &'a Setup,
     sliding: Ends,
+    slow: f64,
     form: Form,
     fineness: Fineness,
     growth: f64,
@@ -304,7 +300,7 @@ fn hopeless(u: &Units) -> f64 {
 
 /// A set for shafts that are no faster than a speed; `Slow` with the speed found if they are.
 fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)> {
-    let u = Units::new(p.setup, p.sliding, cap);
+    let u = Units::new(p.setup, p.sliding, p.slow, cap);
     if u.drive[0] <= 0.0 {
         return Err((Open::Grows, 0.0));
     }
@@ -345,6 +341,7 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
         sliding: p.sliding,
         form: p.form,
         speed_cap: cap,
+        slow_exponent: p.slow,
         strips,
         modes: modes.iter().map(|m| m.id).collect(),
         rows: kept.pick(&rows).map(|row| row.to_vec()).collect(),

@@ -67,6 +67,8 @@ pub struct Setup {
     pub start_volts: Ends,
 }
 
+/// Exponent of Stribeck's curve at which slow speeds end where a law's own gains bound the voltage: a thousandth is left.
+pub(crate) const USUAL_END: f64 = 7.0;
 /// Share of the path's velocity at which slow speeds of a motor axis end at most. Of shares from 0.01 to 0.5 the bounds of
 /// docs/certified.md were least with 0.01 to 0.06, whatever the Stribeck velocity was; from 0.5 on some did not close.
 const OF_A_MOTOR: f64 = 0.03;
@@ -116,18 +118,19 @@ impl Setup {
         }
     }
 
-    /// Exponent of Stribeck's curve, (2), at which its slow speeds end: what is left of it there, `e` to the power of minus this,
-    /// counts as friction at every speed. Within a shell any voltage may come, and friction of a motor axis does not grow with
-    /// the voltage: there narrow slow speeds are worth more than a narrow friction, and end far below the path's.
-    #[must_use]
-    pub fn slow_exponent(&self) -> f64 {
-        let usual = if matches!(self.law, Gains::Shell { .. }) { 2.0 } else { 7.0 };
-        let narrow =
-            |share: f64| libm::pow(share * self.rate / self.stribeck[0], self.stribeck[1]).min(usual);
-        match (self.motor, self.law) {
-            (Some(_), _) => narrow(OF_A_MOTOR),
-            (None, Gains::Shell { .. }) => narrow(IN_A_SHELL),
-            _ => usual,
+    /// Exponents of Stribeck's curve, (2), that are tried as [`Cell::slow_exponent`], the most promising first. Within a shell any
+    /// voltage may come, and friction of a motor axis does not grow with the voltage: there narrow slow speeds are mostly worth
+    /// more than a narrow friction, and end far below the path's.
+    pub(crate) fn slow_exponents(&self) -> Vec<f64> {
+        let narrow = |share: f64| libm::pow(share * self.rate / self.stribeck[0], self.stribeck[1]);
+        let shell = matches!(self.law, Gains::Shell { .. });
+        match self.motor {
+            Some(_) => vec![narrow(OF_A_MOTOR).min(if shell { 2.0 } else { USUAL_END })],
+            None if shell => {
+                let narrow = narrow(IN_A_SHELL).min(2.0);
+                [narrow, 2.0, USUAL_END].into_iter().filter(|x| *x >= narrow).collect()
+            }
+            None => vec![USUAL_END],
         }
     }
 
@@ -296,6 +299,9 @@ pub struct Cell {
     pub form: Form,
     /// Speed that the shaft does not exceed at samples, counts per tick.
     pub speed_cap: f64,
+    /// Exponent of Stribeck's curve, (2), at which its slow speeds end: what is left of it there, `e` to the power of minus this,
+    /// counts as friction at every speed.
+    pub slow_exponent: f64,
     /// Pieces of (31) ahead of its surface; none of PD.
     pub strips: Vec<Strip>,
     /// Modes, in the order of their numbers.
@@ -326,4 +332,4 @@ pub struct Certificate {
 }
 
 /// Version of the format that this crate writes and reads.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;

@@ -5,7 +5,7 @@
 //! saturated one, and a stable one may stick: neither follows from the other.
 
 use crate::rows::back;
-use crate::setup::Setup;
+use crate::setup::{Setup, USUAL_END};
 use crate::units::Units;
 
 /// Spectral radius at one strength of the brake.
@@ -26,7 +26,7 @@ pub fn stability(setup: &Setup) -> Option<[Stability; 3]> {
     if setup.delay_ticks > MOST_DELAY {
         return None;
     }
-    let u = Units::new(setup, setup.sliding, 0.0);
+    let u = Units::new(setup, setup.sliding, USUAL_END, 0.0);
     // Ripple belongs to the box; Stribeck's excess does not, as nothing moves at those speeds for long.
     let [weak, strong] = match &setup.motor {
         Some(motor) => motor.gain,

@@ -63,15 +63,16 @@ impl Units {
 }
 
 impl Units {
-    /// The part of a box with these `μ_d`, for a shaft that is no faster than `speed_cap` at samples.
-    pub(crate) fn new(s: &Setup, sliding: Ends, speed_cap: f64) -> Units {
+    /// The part of a box with these `μ_d`, for a shaft that is no faster than `speed_cap` at samples, and whose slow speeds end at
+    /// this exponent.
+    pub(crate) fn new(s: &Setup, sliding: Ends, slow_exponent: f64, speed_cap: f64) -> Units {
         let count = TAU / f64::from(s.counts_per_rev);
         let speed = count / s.period_s;
         let per = s.period_s * s.period_s / count;
         let (j0, j1) = (s.inertia[0], s.inertia[1]);
         let rest = rest_of(s, sliding);
-        let slow = s.stribeck[0] * libm::pow(s.slow_exponent(), 1.0 / s.stribeck[1]);
-        let left = libm::exp(-s.slow_exponent());
+        let slow = s.stribeck[0] * libm::pow(slow_exponent, 1.0 / s.stribeck[1]);
+        let left = libm::exp(-slow_exponent);
         // A slow part of the curve may lie on either side of the fast one.
         let (low, high) = (
             sliding[0] + left * (rest[0] - sliding[0]).min(0.0),

@@ -281,9 +281,9 @@ fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
     };
     refused("", "EOF");
     refused(&text[..text.len() / 2], "EOF");
-    refused(&text.replacen("\"version\":1", "\"version\":2", 1), "version is 2: expected 1");
+    refused(&text.replacen("\"version\":2", "\"version\":1", 1), "version is 1: expected 2");
     // Any other content that the version may have.
-    refused("{\"version\":2,\"proof\":[]}", "version is 2: expected 1");
+    refused("{\"version\":1,\"proof\":[]}", "version is 1: expected 2");
     refused(&text.replacen("\"inertia\"", "\"inertai\"", 1), "inertai");
     refused(&text.replacen("\"kp\":5000.0", "\"kp\":\"much\"", 1), "f64");
     assert!(file::read(&folder.join("none.json")).unwrap_err().to_string().contains("none.json"));
@@ -308,6 +308,7 @@ fn values_that_no_loop_has_are_refused_by_name() {
     assert!(told(&|c| c.cells.clear()).contains("no cell holds"));
     assert!(told(&|c| c.cells[0].rows[3][0] = f64::INFINITY).contains("rows[3]"));
     assert!(told(&|c| c.cells[0].speed_cap = 0.01).contains("speed_cap"));
+    assert!(told(&|c| c.cells[0].slow_exponent = 0.0).contains("slow_exponent is 0"));
     assert!(told(&|c| c.cells[0].form = Form::Noise).contains("cells[0]"));
 }
 

@@ -226,7 +226,8 @@ fn certify_sides<T: Real>(
     let shortfall = if missing {
         Some(Shortfall::Surface)
     } else if !grows && kp < kp_required {
-        Some(Shortfall::Kp)
+        // Of a law that gives all it has, and of a shell, the limit is what is short.
+        Some(if kd.is_some() { Shortfall::Kp } else { Shortfall::Voltage })
     } else if kd.is_some_and(|kd| kd < kd_required) {
         Some(Shortfall::Kd)
     } else if !grows && reached < kp_required {
@@ -497,6 +498,10 @@ mod tests {
         assert_eq!((c.slope, c.layer), (100.0, 0.2));
         assert!((c.error_bound.to_degrees() - 0.1146).abs() < 1e-4);
         assert!(c.certified());
+        // The weakest of many brakes is too weak for all of the 10 V: there is no K_p to raise.
+        let weak = bounds(Tolerances { friction: 0.8, ..Tolerances::default() });
+        let c = certify_alone(&law(LawParams::Pd(PdParams::default())), &weak, &at_2_deg_s()).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Voltage));
         let no_kd = PdParams { kd: 0.0, ..PdParams::default() };
         let c =
             certify_alone(&law(LawParams::Pd(no_kd)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();

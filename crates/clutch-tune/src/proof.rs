@@ -1,6 +1,6 @@
 //! Certificates of candidates: each is found, and then checked by the checker, which shares nothing with the search.
 
-use clutch_certificate::{Certificate, Options, checker, largest, search};
+use clutch_certificate::{Certificate, Gains, Options, checker, largest, search};
 use clutch_sim::Scenario;
 use clutch_sim::ScenarioError;
 use clutch_sim::scenario::{Proven, Value};
@@ -71,7 +71,8 @@ pub(crate) fn prove(
             widest: if shell { WIDE } else { Options::default().widest },
             narrowest: if shell { WIDE } else { Options::default().narrowest },
             error_limit: WORST,
-            patient: !shell,
+            // Nor is patience worth its minute with an integral.
+            patient: !matches!(setup.law, Gains::Shell { .. } | Gains::Pid { .. }),
         };
         let found = search(setup, &options, false);
         if let Some(open) = found.open.first() {

@@ -103,7 +103,7 @@ impl Shaft {
         let (weakest_drive, strongest_drive) = (at(s.drive_torque[0]) - noise, at(s.drive_torque[1]) + noise);
 
         // Stribeck's speeds end at this exponent of the curve: any speed would do, as long as what is left is bounded there.
-        let exponent = at(libm::pow(s.slow_exponent(), 1.0 / s.stribeck[1]));
+        let exponent = at(libm::pow(cell.slow_exponent, 1.0 / s.stribeck[1]));
         let slow_si = (at(s.stribeck[0]) * exponent).most();
         let power = at(libm::pow((slow_si / at(s.stribeck[0])).low, s.stribeck[1])).widened(LIBRARY);
         let left = at(libm::exp(-power.low)).widened(LIBRARY).most();
