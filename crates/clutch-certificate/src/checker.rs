@@ -403,10 +403,7 @@ fn shape(cell: &Cell, n: usize) -> Result<(), Flaw> {
         return no(format!("speed_cap is {}: expected a number above 0, up to 10000", cell.speed_cap));
     }
     if !(cell.slow_exponent > 0.0 && cell.slow_exponent <= 100.0) {
-        return no(format!(
-            "slow_exponent is {}: expected a number above 0, up to 100",
-            cell.slow_exponent
-        ));
+        return no(format!("slow_exponent is {}: expected a number above 0, up to 100", cell.slow_exponent));
     }
     Ok(())
 }

@@ -45,7 +45,7 @@ impl Replay {
         }
         let log = clutch_log::read(&self.log, &Limits::default())?;
         let origin = format!("{}: its scenario", self.log.display());
-        let scenario = Scenario::parse(&origin, &log.header.scenario_toml, &self.set)?;
+        let scenario = Scenario::of_log(&origin, &log.header.scenario_toml, &self.set)?;
         let replayed = replay(&log, &scenario, UNWATCHED)?;
         if let Some(file) = &self.plot {
             figure(&log, &scenario, &replayed.commands)?.save(file)?;
@@ -63,6 +63,12 @@ impl Replay {
         }
         if replayed.behind_gap > 0 {
             text += &format!("a gap: {} ticks behind it are not comparable\n", replayed.behind_gap);
+        }
+        if replayed.terms_apart > 0 {
+            text += &paragraph(&format!(
+                "the law had another number of terms: {} of them not compared",
+                replayed.terms_apart
+            ));
         }
         let drift = drift(&log, &scenario, UNWATCHED)?;
         text += &paragraph(&format!("{}: {}", drift.label(), drift.words()));

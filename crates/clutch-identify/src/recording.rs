@@ -110,7 +110,7 @@ impl Recording {
     /// # Errors
     /// No scenario, neither brake nor motor, no samples.
     pub fn from_log(name: &str, log: &Log) -> Result<Vec<Recording>, ReadError> {
-        let scenario = Scenario::parse(name, &log.header.scenario_toml, &[])
+        let scenario = Scenario::of_log(name, &log.header.scenario_toml, &[])
             .map_err(|error| ReadError::Scenario { name: name.to_owned(), error: Box::new(error) })?;
         let extra = |key: &str| log.header.extra.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
         let present = extra(PRESENT_CODE).and_then(|v| v.parse().ok());

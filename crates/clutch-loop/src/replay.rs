@@ -81,6 +81,8 @@ pub struct Replay {
     pub dropped: u64,
     /// Commands in the log behind its first gap: they are not comparable.
     pub behind_gap: usize,
+    /// Terms that the logged law had more or fewer than this one, as that of a former version: they are not comparable.
+    pub terms_apart: usize,
 }
 
 /// Ticks in order; every few thousand the caller gets a report, and may end the work.
@@ -98,26 +100,23 @@ fn ticks<'a, R>(
     })
 }
 
-/// The first field in which two commands differ, in its bits; times may.
+/// The first field that both have and in which two commands differ, in its bits; times may.
 fn difference(
     columns: &[(String, Kind)],
     logged: &CommandRecord,
     replayed: &CommandRecord,
 ) -> Option<Difference> {
-    // A term that a law does not have is no number.
-    let number = |value: Option<Value>| match value {
-        Some(Value::Whole(x)) => x as f64,
-        Some(Value::Real(x)) => x,
-        Some(Value::Flag(x)) => f64::from(u8::from(x)),
-        None => f64::NAN,
+    let number = |value: Value| match value {
+        Value::Whole(x) => x as f64,
+        Value::Real(x) => x,
+        Value::Flag(x) => f64::from(u8::from(x)),
     };
-    let bits = |value: Option<Value>| match value {
-        Some(Value::Real(x)) => Some(Value::Whole(x.to_bits() as i64)),
+    let bits = |value: Value| match value {
+        Value::Real(x) => Value::Whole(x.to_bits() as i64),
         other => other,
     };
-    let (mut a, mut b) = (logged.values(), replayed.values());
-    columns.iter().find_map(|(field, _)| {
-        let (logged_value, replayed_value) = (a.next(), b.next());
+    let pairs = columns.iter().zip(logged.values().zip(replayed.values()));
+    pairs.into_iter().find_map(|((field, _), (logged_value, replayed_value))| {
         (bits(logged_value) != bits(replayed_value)).then(|| Difference {
             tick: logged.tick,
             field: field.clone(),
@@ -217,7 +216,9 @@ fn compared(log: &Log, commands: Vec<CommandRecord>, report: Report<'_>) -> Resu
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
     // A log that was cut may have one sample more than it has commands, or the other way round.
     let behind_gap = log.samples.len().min(log.commands.len()).saturating_sub(commands.len());
-    Ok(Replay { commands, first, dropped, behind_gap })
+    let terms = |commands: &[CommandRecord]| commands.first().map_or(0, |c| c.terms.len());
+    let terms_apart = terms(&log.commands).abs_diff(terms(&commands));
+    Ok(Replay { commands, first, dropped, behind_gap, terms_apart })
 }
 
 fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {

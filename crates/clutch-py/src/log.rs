@@ -104,7 +104,7 @@ impl Log {
 
     fn scenario(&self, py: Python<'_>) -> PyResult<Scenario> {
         let origin = format!("{}: its scenario", self.origin);
-        let read = clutch_sim::Scenario::parse(&origin, &self.log.header.scenario_toml, &[]);
+        let read = clutch_sim::Scenario::of_log(&origin, &self.log.header.scenario_toml, &[]);
         Ok(Scenario(Arc::new(read.map_err(|e| scenario_error(py, &e, None))?)))
     }
 }

@@ -171,7 +171,8 @@ impl fmt::Display for Grouped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let n = self.0.abs();
         if !(1e4..1e15).contains(&n) || n % 1.0 > 0.0 {
-            return self.0.fmt(f);
+            // The largest whole number of a file is no number of 53 bits.
+            return if n == 9_223_372_036_854_775_808.0 { i64::MAX.fmt(f) } else { self.0.fmt(f) };
         }
         if self.0 < 0.0 {
             f.write_str("-")?;

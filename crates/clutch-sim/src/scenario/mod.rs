@@ -26,7 +26,9 @@ use crate::rig::{Rig, RigBase, RigParams};
 use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use crate::scenario_error::ScenarioError;
-use crate::tables::{self, check, checked, complete, find, lookup, nearest, read, row_at, shown};
+use crate::tables::{
+    self, check, checked, complete, find, lookup, nearest, read, row_at, shown, with_todays_keys,
+};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::{Asked, Law, Output, Shell};
@@ -148,6 +150,11 @@ pub struct Plan {
     pub demand: Demand,
 }
 
+/// Overrides as they are written, read.
+fn values(origin: &str, set: &[(String, String)]) -> Result<Vec<(String, Value)>, ScenarioError> {
+    set.iter().map(|(key, text)| Ok((key.clone(), written::read_value(origin, key, text)?))).collect()
+}
+
 impl Scenario {
     /// Reads a scenario; `origin` (a file's name) is what errors begin with, and each of `set`
     /// (`("law.smc.kp_v", "4")`) overrides a key.
@@ -155,10 +162,17 @@ impl Scenario {
     /// # Errors
     /// The mistake, its place, and what is expected.
     pub fn parse(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
-        let read =
-            |(key, text): &(String, String)| Ok((key.clone(), written::read_value(origin, key, text)?));
-        let values = set.iter().map(read).collect::<Result<Vec<_>, ScenarioError>>()?;
-        Scenario::from_table(origin, read_table(origin, text)?, &values)
+        Scenario::from_table(origin, read_table(origin, text)?, &values(origin, set)?)
+    }
+
+    /// As [`Scenario::parse`], of a log's scenario, which may have keys of a version before this one: a log is not written anew.
+    ///
+    /// # Errors
+    /// The mistake, its place, and what is expected.
+    pub fn of_log(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
+        let mut table = read_table(origin, text)?;
+        with_todays_keys(&mut table);
+        Scenario::from_table(origin, table, &values(origin, set)?)
     }
 
     /// As [`Scenario::parse`], from a table that is already read, with values for the keys to

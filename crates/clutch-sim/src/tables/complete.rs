@@ -60,6 +60,8 @@ pub(crate) fn complete_table(
         return Err(unknown_key(origin, path, unknown, table.get(unknown), &keys));
     }
     let mut whole = Table::new();
+    // What is wrong goes before what is missing: the reader has written it.
+    let mut lacks: Option<ScenarioError> = None;
     for (key, entry) in &keys {
         let at = join(path, key);
         let found = table.remove(*key);
@@ -75,11 +77,18 @@ pub(crate) fn complete_table(
                     whole.insert((*key).to_owned(), in_kind(row.kind, value));
                 }
                 None if row.optional => {}
-                None => return Err(missing(origin, &at)),
+                None => {
+                    lacks.get_or_insert_with(|| missing(origin, &at));
+                }
             },
             Entry::Below(info, optional) => match (found, optional) {
                 (Some(Value::Table(mut below)), _) => {
-                    complete(origin, &at, info, &mut below)?;
+                    match complete(origin, &at, info, &mut below) {
+                        Err(error) if error.message == MISSING => {
+                            lacks.get_or_insert(error);
+                        }
+                        other => other?,
+                    }
                     whole.insert((*key).to_owned(), Value::Table(below));
                 }
                 (Some(other), _) => {
@@ -97,13 +106,15 @@ pub(crate) fn complete_table(
                         complete(origin, &at, info, &mut below)?;
                         whole.insert((*key).to_owned(), Value::Table(below));
                     }
-                    None => return Err(missing(origin, &at)),
+                    None => {
+                        lacks.get_or_insert_with(|| missing(origin, &at));
+                    }
                 },
             },
         }
     }
     *table = whole;
-    Ok(())
+    lacks.map_or(Ok(()), Err)
 }
 
 /// A table without a word of the user's, if every parameter has a default. The first option of a choice is its
@@ -147,7 +158,14 @@ fn complete_choice(
         } else {
             table.keys().map(|k| format!("[{path}.{k}]")).collect::<Vec<_>>().join(", ")
         };
-        let message = format!("expected exactly one table below it; found {found}");
+        // A key that is set below one choice does not take another away.
+        let other = match table.keys().next_back() {
+            Some(last) if table.len() > 1 => {
+                format!("; to choose another, set it as a whole: {path}={{{last}={{…}}}}")
+            }
+            _ => String::new(),
+        };
+        let message = format!("expected exactly one table below it; found {found}{other}");
         return Err(ScenarioError::new(origin, path, "", message));
     }
     for option in info.options {
@@ -161,17 +179,53 @@ fn complete_choice(
     Ok(())
 }
 
+const MISSING: &str = "missing; add it (docs/scenario.md lists every key)";
+
 fn missing(origin: &str, key: &str) -> ScenarioError {
-    let message = "missing; add it (docs/scenario.md lists every key)".to_owned();
-    ScenarioError::new(origin, key, "", message)
+    ScenarioError::new(origin, key, "", MISSING.to_owned())
 }
 
 /// Keys of versions before this one, and where their values stand now.
-const FORMER: [(&str, &str); 3] = [
+const MOVED: [(&str, &str); 11] = [
     ("rig.brake_gain_nm_v", "rig.actuator.brake.gain_nm_v"),
     ("rig.brake_geometry", "rig.actuator.geometry"),
     ("model.brake_gain_nm_v", "model.actuator.brake.gain_nm_v"),
+    ("rig.friction.mu_static", "rig.friction.stribeck.mu_static"),
+    ("rig.friction.mu_dynamic", "rig.friction.stribeck.mu_dynamic"),
+    ("rig.friction.stribeck_velocity_rad_s", "rig.friction.stribeck.stribeck_velocity_rad_s"),
+    ("rig.friction.stribeck_exponent", "rig.friction.stribeck.stribeck_exponent"),
+    ("model.mu_static", "model.friction.stribeck.mu_static"),
+    ("model.mu_dynamic", "model.friction.stribeck.mu_dynamic"),
+    ("model.stribeck_velocity_rad_s", "model.friction.stribeck.stribeck_velocity_rad_s"),
+    ("model.stribeck_exponent", "model.friction.stribeck.stribeck_exponent"),
 ];
+
+/// Keys of versions before this one that nothing has taken over.
+const GONE: [&str; 1] = ["safety.limits.stand_still_counts"];
+
+/// The table of a former version's log with the keys of today: those that moved, in their places, and without those that are
+/// gone.
+pub(crate) fn with_todays_keys(table: &mut Table) {
+    let take = |table: &mut Table, path: &str| {
+        let (below, key) = path.rsplit_once('.').unwrap_or(("", path));
+        let parts = below.split('.').filter(|part| !part.is_empty());
+        parts.fold(Some(table), |at, part| at?.get_mut(part)?.as_table_mut())?.remove(key)
+    };
+    for path in GONE {
+        let _ = take(table, path);
+    }
+    for (old, new) in MOVED {
+        let Some(value) = take(table, old) else { continue };
+        let (below, key) = new.rsplit_once('.').unwrap_or(("", new));
+        let mut at = &mut *table;
+        for part in below.split('.') {
+            let next = at.entry(part).or_insert_with(|| Value::Table(Table::new()));
+            let Value::Table(next) = next else { return };
+            at = next;
+        }
+        at.insert(key.to_owned(), value);
+    }
+}
 
 fn unknown_key(
     origin: &str,
@@ -190,18 +244,23 @@ fn unknown_key(
         _ => None,
     });
     let whole = join(path, unknown);
-    let former = FORMER.iter().find(|(old, _)| *old == whole);
-    let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(moved);
+    let former = MOVED.iter().find(|(old, _)| *old == whole);
+    let gone = GONE.contains(&whole.as_str()).then(|| ": it is gone, leave it out".to_owned());
+    let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(gone).or(moved);
     let hint = moved.unwrap_or_else(|| correction(unknown, value, &names));
     let shown = value.filter(|v| !v.is_table()).map(shown).unwrap_or_default();
     let message = format!("unknown key{}", expected(&hint, &names));
     ScenarioError::new(origin, &whole, &shown, message)
 }
 
-/// A whole number where a real one is expected is one.
+/// A whole number where a real one is expected is one, and a real number that is whole is a whole number, as for JSON Schema.
 fn in_kind(kind: Kind, value: Value) -> Value {
     match (kind, &value) {
         (Kind::Real, Value::Integer(i)) => Value::Float(*i as f64),
+        // Beyond 2⁵³ a real number stands for several whole ones.
+        (Kind::Whole, Value::Float(x)) if libm::trunc(*x) == *x && x.abs() <= 9_007_199_254_740_992.0 => {
+            Value::Integer(*x as i64)
+        }
         _ => value,
     }
 }
@@ -209,38 +268,35 @@ fn in_kind(kind: Kind, value: Value) -> Value {
 /// The value, if it is of the row's kind and in its range.
 pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result<Value, ScenarioError> {
     let expected = || row.range.words(row.kind, &row.unit, false).to_string();
-    let wrong =
-        |value: &Value, expected: &str| Err(ScenarioError::value(origin, at, &shown(value), expected));
+    let given = shown(&value);
+    let wrong = |given: &str, expected: &str| Err(ScenarioError::value(origin, at, given, expected));
     let number = |x: f64| row.range.holds(&clutch_core::params::NONE, x);
     let value = in_kind(row.kind, value);
     match (row.kind, &value) {
         (Kind::Real, Value::Float(x)) if number(*x) => Ok(value),
-        (Kind::Real, Value::Float(_)) => wrong(&value, &expected()),
-        (Kind::Real, _) => wrong(&value, "a number"),
         (Kind::Whole, Value::Integer(i)) if *i >= 0 && number(*i as f64) => Ok(value),
-        (Kind::Whole, Value::Integer(_)) => wrong(&value, &expected()),
-        (Kind::Whole, _) => wrong(&value, "a whole number of at least 0"),
         (Kind::Switch, Value::Boolean(_)) | (Kind::Text, Value::String(_)) => Ok(value),
         (Kind::Word(words), Value::String(word)) if words.iter().any(|w| w.name == word) => Ok(value),
         (Kind::Word(words), Value::String(word)) => {
             let names: Vec<&str> = words.iter().map(|w| w.name).collect();
-            wrong(&value, &format!("{}{}", expected(), nearest(word, &names)))
+            wrong(&given, &format!("{}{}", expected(), nearest(word, &names)))
         }
         (Kind::Points, Value::Array(points)) => {
             let Some(pairs) = points.iter().map(pair).collect::<Option<Vec<_>>>() else {
-                return wrong(&value, &expected());
+                return wrong(&given, &expected());
             };
             let pairs = Points(pairs);
             if pairs.0.is_empty() {
-                return wrong(&value, &expected());
+                return wrong(&given, &expected());
             }
             if let Some(i) = pairs.wrong(&row.range, &row.unit) {
-                return Err(ScenarioError::value(origin, at, &format!("(point {i})"), &expected()));
+                let point = pairs.0.get(i).map_or(String::new(), |(a, b)| format!("[{a}, {b}] "));
+                return wrong(&format!("{point}(point {i})"), &expected());
             }
             let array = |(a, b)| Value::Array(vec![Value::Float(a), Value::Float(b)]);
             Ok(Value::Array(pairs.0.into_iter().map(array).collect()))
         }
-        _ => wrong(&value, &expected()),
+        _ => wrong(&given, &expected()),
     }
 }
 

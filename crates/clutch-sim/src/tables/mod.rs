@@ -11,7 +11,9 @@ mod set;
 mod suggest;
 
 pub(crate) use check::check;
-pub(crate) use complete::{checked, complete, complete_table, default_of, find, lookup, pair, shown};
+pub(crate) use complete::{
+    checked, complete, complete_table, default_of, find, lookup, pair, shown, with_todays_keys,
+};
 pub use leaves::{Points, Text};
 pub(crate) use read::{read, read_known};
 pub(crate) use set::{row_at, set};
