@@ -295,13 +295,20 @@ def _values(key: str, values: Any) -> tuple[Any, ...]:
     return plain
 
 
+def _below(cls: type[_Record]) -> Iterator[type[_Record]]:
+    """Subclasses, and theirs."""
+    for sub in cls.__subclasses__():
+        yield sub
+        yield from _below(sub)
+
+
 def _plain(key: str, value: Any) -> Any:
     """A key's value as a file could hold it: Python numbers, lists and dicts."""
     if isinstance(value, _Params):
         table = value._tables()
         *_, name = key.split(".")
         *_, own = value._key.split(".")
-        tables: tuple[type[_Record], ...] = (Scenario, *_Params.__subclasses__())
+        tables: tuple[type[_Record], ...] = (Scenario, *_below(_Params))
         homes = (slot for cls in tables for slot in _slots(cls) if slot.name == name)
         if name != own and not any(type(value) in slot.classes for slot in homes):
             raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")

@@ -92,8 +92,9 @@ class _RayFuture:
 
     def cancel(self) -> bool:
         if not self.done():
-            self._ray.cancel(self._reference)
+            # First: a thread that waits for the result may see the end of the task before this one goes on.
             self._cancelled = True
+            self._ray.cancel(self._reference)
         return self._cancelled
 
 

@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, beside, json, paragraph, report, wrote};
+use crate::output::{Exit, beside, check_files, json, paragraph, report, wrote};
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -43,6 +43,7 @@ pub(crate) struct Certify {
 
 impl Certify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        check_files(&self.save)?;
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;

@@ -27,7 +27,7 @@ use std::path::PathBuf;
 /// This is hardware in the loop, without the hardware: the board's own image runs, on a Cortex-M4F
 /// in qemu-system-arm or, for a NUCLEO-G474RE or a Raspberry Pi Pico, on a register model of its chip;
 /// it takes a step, and waits for the simulation to take one. Time is computed, so that a run is the same each time, bit
-/// for bit, however long it takes; the figures are those of `clutch sim` in single precision.
+/// for bit, however long it takes. Laws without memory under a weight have the figures of `clutch sim` in single precision.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \

@@ -110,6 +110,7 @@ impl Identify {
         #[cfg(not(target_os = "linux"))]
         self.at_port.refuse("identify")?;
         self.live.check()?;
+        output::check_files(self.out.iter().chain(&self.map))?;
         let (scenario, set) = (self.scenario.clone(), self.set.clone());
         let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let scenario = args.load()?;

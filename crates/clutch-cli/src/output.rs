@@ -52,7 +52,11 @@ pub const BUILD: &str = env!("CLUTCH_BUILD");
 /// Says that nothing was started, and what to do.
 #[cfg(target_os = "linux")]
 pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
-    let advice = format!("`clutch certify {}` says why; --uncertified runs it all the same.", file.display());
+    let advice = format!(
+        "`clutch certify {}` says why; --certificate takes a proof of the sampled loop, which `clutch certify --sampled --save` \
+         and `clutch tune --save` write; --uncertified runs it all the same.",
+        file.display()
+    );
     paragraph(&refusal.to_string()) + &paragraph(&advice)
 }
 
@@ -60,6 +64,24 @@ pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, fi
 pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
     if path.exists() {
         anyhow::bail!("{}: exists already; name a new file", path.display());
+    }
+    Ok(())
+}
+
+/// Refuses files that cannot be written: before a long run, not after. What stands there is not touched.
+pub(crate) fn check_files<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> anyhow::Result<()> {
+    for file in files {
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            anyhow::bail!("{}: cannot be written: its folder does not exist", file.display());
+        }
+        if file.is_dir() {
+            anyhow::bail!("{}: cannot be written: it is a folder", file.display());
+        }
+        let closed = file.metadata().is_ok_and(|found| found.permissions().readonly());
+        if closed {
+            anyhow::bail!("{}: cannot be written: it is read-only", file.display());
+        }
     }
     Ok(())
 }
@@ -340,9 +362,10 @@ pub(crate) struct Forms {
 }
 
 impl Forms {
-    /// Refuses a picture's file that cannot be drawn: before a long run, not after.
+    /// Refuses a picture's file that cannot be drawn, and files that cannot be written: before a long run, not after.
     pub(crate) fn check(&self) -> anyhow::Result<()> {
-        self.plot.as_deref().map_or(Ok(()), |file| plot::figure_format(file).map(drop))
+        self.plot.as_deref().map_or(Ok(()), |file| plot::figure_format(file).map(drop))?;
+        check_files(self.plot.iter().chain(&self.html))
     }
 
     /// True if standard output is to hold JSON alone.

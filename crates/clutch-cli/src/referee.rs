@@ -81,18 +81,23 @@ impl Outcome {
     }
 }
 
-/// The results of all engines that take the case.
-fn results(case: &Case, engines: &[RefereeEngine]) -> Vec<Outcome> {
+/// The results of all engines that take the case, and the others with what they need.
+fn results(case: &Case, engines: &[RefereeEngine]) -> (Vec<Outcome>, Vec<String>) {
+    let mut others = Vec::new();
     let one = |engine: &RefereeEngine| {
         let begin = Instant::now();
         let (verdicts, error) = match run(case, *engine, None) {
             Ok(trajectory) => (case.judge(&trajectory), None),
-            Err(RefereeError::NotForIt(_)) => return None,
+            Err(RefereeError::NotForIt(needs)) => {
+                others.push(format!("{}: {needs}", engine.name()));
+                return None;
+            }
             Err(e) => (Vec::new(), Some(e.to_string())),
         };
         Some(Outcome { engine: *engine, verdicts, seconds: begin.elapsed().as_secs_f64(), error })
     };
-    engines.iter().filter_map(one).collect()
+    let taken = engines.iter().filter_map(one).collect();
+    (taken, others)
 }
 
 impl Referee {
@@ -122,9 +127,9 @@ impl Referee {
         let cases = names.iter().map(|name| load(name)).collect::<anyhow::Result<Vec<_>>>()?;
         let mut all = Vec::new();
         for case in &cases {
-            let results = results(case, &engines);
+            let (results, others) = results(case, &engines);
             if !self.json {
-                tell(&table(case, &results))?;
+                tell(&table(case, &results, &others))?;
             }
             all.push(results);
         }
@@ -157,10 +162,14 @@ fn as_json(cases: &[Case], all: &[Vec<Outcome>]) -> serde_json::Value {
 }
 
 /// A case: a line for each figure, a column for each engine.
-fn table(case: &Case, results: &[Outcome]) -> String {
+fn table(case: &Case, results: &[Outcome], others: &[String]) -> String {
     let mut out = format!("{}  {}\n", case.id, case.title);
     if results.is_empty() {
-        return out + "  no engine that was asked takes it\n\n";
+        out += "  no engine that was asked takes it\n";
+        for other in others {
+            out += &beside("  ", other);
+        }
+        return out + "\n";
     }
     let mut lines = vec![vec![String::new(), "expected".to_owned(), "within".to_owned()]];
     lines[0].extend(results.iter().map(|r| r.engine.name().to_owned()));

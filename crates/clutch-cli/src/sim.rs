@@ -168,7 +168,7 @@ impl<'a> Summary<'a> {
             rig_cannot_follow: scenario.cannot_follow()?,
             friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
             bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
-                .lacks_damping(run.trace.start_voltage),
+                .lacks_damping(scenario.spec().output.highest),
         })
     }
 }

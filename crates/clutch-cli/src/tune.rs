@@ -2,7 +2,7 @@
 
 use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
-use crate::output::{Exit, Forms, json, paragraph, tell, with_progress, write, wrote};
+use crate::output::{Exit, Forms, check_files, json, paragraph, tell, with_progress, write, wrote};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{Page, ReportFigure, ReportTable};
 use crate::table::number;
@@ -56,6 +56,7 @@ pub(crate) struct Tune {
 impl Tune {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         self.forms.check()?;
+        check_files(self.out.iter().chain(&self.save))?;
         let scenario = self.scenario.load()?;
         let rig = self.scenario.identified.as_deref().map(read_rig_file).transpose()?;
         let options = Options {
@@ -285,7 +286,20 @@ fn text(tuned: &Tuned) -> String {
             ));
         }
     }
-    out + &paragraph(&verdict(tuned))
+    out += &paragraph(&verdict(tuned));
+    if let Some(winner) = tuned.winner()
+        && let (Verdict::Certified { error_rad, .. }, Some(scenario)) = (&winner.verdict, &winner.scenario)
+        && let Ok(safety) = scenario.safety()
+    {
+        let limit = safety.limits.supervisor.following_error;
+        if *error_rad > limit {
+            out += &paragraph(&format!(
+                "note: that bound is above safety.limits.following_error_deg = {}, at which the loop ends a run",
+                number(limit.to_degrees())
+            ));
+        }
+    }
+    out
 }
 
 /// Disc of the picture: the first of those that candidates are judged on.

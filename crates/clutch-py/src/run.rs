@@ -64,8 +64,10 @@ pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<
     let run = Arc::new(run.map_err(|e| scenario.error(py, &e))?);
     let spec = scenario.0.spec();
     let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
-    if let Some(lacks) = rig.lacks_damping(run.trace.start_voltage) {
-        let note = CString::new(format!("{}: {}", scenario.0.name(), not_passive(lacks)))?;
+    let lacks = rig.lacks_damping(spec.output.highest).map(not_passive);
+    let cannot = scenario.0.cannot_follow().map_err(|e| scenario.error(py, &e))?;
+    for note in lacks.into_iter().chain(cannot) {
+        let note = CString::new(format!("{}: {note}", scenario.0.name()))?;
         // Of the line that asked for the run, not of the package's own.
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 2)?;
     }

@@ -146,8 +146,8 @@ impl Default for RigParams {
 #[must_use]
 pub fn not_passive(lacks: f64) -> String {
     format!(
-        "at the voltage of the start the bristles of the friction can give energy: they are passive with {} N m s/rad more \
-         of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
+        "at the highest voltage the bristles of the friction can give energy: they are passive with {} N m s/rad more of \
+         rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
         crate::number(lacks)
     )
 }

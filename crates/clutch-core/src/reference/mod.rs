@@ -38,7 +38,7 @@ use wave::Wave;
 crate::params! {
     /// Constant rate from the first tick: the paper's path.
     pub struct Ramp<T> {
-        /// Rate, to which the velocity jumps at the start. A brake follows only the sign of its drive.
+        /// Rate, to which the velocity jumps at the start; with a brake above 0.
         rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
     }
     relations(p) {

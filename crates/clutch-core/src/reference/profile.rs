@@ -8,7 +8,7 @@ use crate::{FixedCounts, ParamError, Real};
 crate::params! {
     /// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
     pub struct Trapezoid<T> {
-        /// Distance. Either sign; a brake follows only the sign of its drive.
+        /// Distance. Either sign; with a brake above 0.
         distance: T, "distance_deg" "" DEG, Range::ANY;
         /// Highest speed.
         speed: T, "speed_deg_s" "" DEG_S, Range::above(0.0);
@@ -30,7 +30,7 @@ crate::params! {
 crate::params! {
     /// Rest to rest with bounded jerk: seven pieces, fewer where a bound is not reached.
     pub struct JerkLimited<T> {
-        /// Distance. Either sign; a brake follows only the sign of its drive.
+        /// Distance. Either sign; with a brake above 0.
         distance: T, "distance_deg" "" DEG, Range::ANY;
         /// Highest speed.
         speed: T, "speed_deg_s" "" DEG_S, Range::above(0.0);
@@ -56,7 +56,7 @@ crate::params! {
 crate::params! {
     /// Rest to rest along `10 s³ − 15 s⁴ + 6 s⁵`, `s = t/duration` (Flash and Hogan 1985).
     pub struct MinimumJerk<T> {
-        /// Distance. Either sign; a brake follows only the sign of its drive.
+        /// Distance. Either sign; with a brake above 0.
         distance: T, "distance_deg" "" DEG, Range::ANY;
         /// Time of the path.
         duration: T, "duration_s" "" S, Range::above(0.0).up_to(1e6);

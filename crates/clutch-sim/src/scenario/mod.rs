@@ -685,6 +685,11 @@ impl Scenario {
                         "{at_time}: with output.lowest_v = {} the brake never lets go enough for the drive to keep the path; lower it",
                         p.output.lowest
                     ),
+                    Obstacle::Acceleration if available <= 0.0 && bounds.preload > 0.0 => format!(
+                        "{at_time}: the disc drags more than the drive gives, which grants {:.5} °/s²; lower model.actuator.{}.preload_nm and the rig's, or give rig.drive and model.drive_torque_nm more torque",
+                        available.to_degrees(),
+                        if bounds.actuator == ActuatorKind::Brake { "brake" } else { "both" }
+                    ),
                     Obstacle::Acceleration => format!(
                         "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly, give rig.drive and model.drive_torque_nm more torque, or give rig and model a motor",
                         asked.to_degrees(),

@@ -15,7 +15,7 @@ use clutch_core::{ActuatorKind, Bounds, Dac, Interval, Plant, Tolerances, Veloci
 pub const NOISE_ROOTS: f64 = 4.0;
 
 /// Stribeck velocity of a friction that falls at once, rad/s.
-const AT_ONCE: f64 = 1e-6;
+pub(super) const AT_ONCE: f64 = 1e-6;
 
 /// The sampled-data certificate does not cover such a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

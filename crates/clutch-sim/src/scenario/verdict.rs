@@ -1,7 +1,7 @@
 //! Verdicts on the sampled loop, each with its scope: the error bound, linear stability.
 
 use super::Scenario;
-use super::sampled::{NotCovered, gains};
+use super::sampled::{AT_ONCE, NotCovered, gains};
 use crate::number;
 use clutch_certificate::checker::{self, Checked, Refused};
 use clutch_certificate::file::{self, FileError};
@@ -248,8 +248,17 @@ fn scope(s: &Setup) -> String {
         if exact(side) { number(low) } else { format!("{} … {}", number(low), number(high)) }
     };
     let (name, gain) = gain(s);
+    // A slower fall leaves more of it at speeds that count as fast.
+    let [velocity, exponent] = s.stribeck;
+    let falls = if s.at_rest[1] <= s.sliding[0] {
+        String::new()
+    } else if velocity <= AT_ONCE {
+        ", which falls at once".to_owned()
+    } else {
+        format!(", v_s up to {} rad/s, δ {}", number(velocity), number(exponent))
+    };
     let mut out = format!(
-        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, {name} {} N m/V",
+        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}{falls}; J {} kg m², T_u {} N m, {name} {} N m/V",
         number(1e6 * s.period_s),
         ticks(s),
         s.counts_per_rev,
