@@ -12,6 +12,7 @@ mod field_laws;
 mod glide;
 mod intervals;
 mod laws;
+mod letting_go;
 mod linear;
 mod one_shaft;
 mod parts;

@@ -73,6 +73,8 @@ pub(super) struct Padded<'a, const N: usize, const B: usize> {
     rows: SMatrix<f64, B, N>,
     base: SVector<f64, B>,
     longest: f64,
+    /// The most that loads and normal forces bend.
+    bends: (SVector<f64, N>, SVector<f64, B>),
 }
 
 impl<'a, const N: usize, const B: usize> Padded<'a, N, B> {
@@ -90,6 +92,10 @@ impl<'a, const N: usize, const B: usize> Padded<'a, N, B> {
             rows: SMatrix::from_fn(|i, j| at(i).and_then(|row| row.joints.get(j)).copied().unwrap_or(0.0)),
             base: SVector::from_fn(|i, _| at(i).map_or(0.0, |row| row.base_velocity)),
             longest: if quiet { f64::INFINITY } else { (0.1 / fastest).min(0.1) },
+            bends: (
+                SVector::from_fn(|i, _| mechanism.load.get(i).map_or(0.0, Signal::curvature)),
+                SVector::from_fn(|i, _| at(i).map_or(0.0, |row| row.normal.curvature())),
+            ),
         }
     }
 }
@@ -119,6 +125,10 @@ impl<const N: usize, const B: usize> System<N, B> for Padded<'_, N, B> {
     fn friction(&self, row: usize) -> &Friction<f64> {
         // Rows that it has not rub on nothing.
         &self.mechanism.rows[row.min(self.mechanism.rows.len() - 1)].friction
+    }
+
+    fn curvature(&self, _: f64, _: f64) -> Option<(SVector<f64, N>, SVector<f64, B>)> {
+        Some(self.bends)
     }
 
     fn longest_step(&self) -> f64 {

@@ -53,6 +53,16 @@ impl Signal {
         self.0.iter().filter(|t| t.amplitude != 0.0).fold(0.0, |most, t| most.max(t.frequency_hz.abs()))
     }
 
+    /// The most that it bends between two corners, per s²: its lines do not, its sines by the square of their frequency.
+    #[must_use]
+    pub fn curvature(&self) -> f64 {
+        let one = |term: &Term| {
+            let w = core::f64::consts::TAU * term.frequency_hz;
+            term.amplitude.abs() * w * w
+        };
+        self.0.iter().map(one).sum()
+    }
+
     /// Its value, if it never changes.
     #[must_use]
     pub fn constant(&self) -> Option<f64> {

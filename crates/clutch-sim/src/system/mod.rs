@@ -15,6 +15,7 @@
 //! rows with bristles beside rows without.
 
 mod bristled;
+mod letting_go;
 mod modes;
 mod motion;
 
@@ -48,8 +49,19 @@ pub trait System<const N: usize, const B: usize> {
     /// Friction of a row.
     fn friction(&self, row: usize) -> &Friction<f64>;
 
-    /// Time within which no load or normal force goes to and fro, s: a row that lets go and holds again within a step of that
-    /// length is not seen.
+    /// The most that loads, at positions and velocities that are held, and normal forces bend between two times without a corner
+    /// between them: bounds of their second derivatives, N m/s² for each joint and each row. `None`: nobody knows.
+    ///
+    /// A row that lets go within a step is found by these bounds, however short its excess. Where nobody knows them, they are
+    /// estimated from values within each step, which is sound if [`longest_step`](Self::longest_step) is a tenth of the fastest
+    /// period or less.
+    fn curvature(&self, from: f64, to: f64) -> Option<(SVector<f64, N>, SVector<f64, B>)> {
+        let _ = (from, to);
+        None
+    }
+
+    /// Time within which no load or normal force goes to and fro, s: what moves takes no longer steps, so that their error can
+    /// be estimated.
     fn longest_step(&self) -> f64 {
         1e-3
     }

@@ -1,6 +1,7 @@
 //! The motion of a system from event to event.
 
 use super::System;
+use super::letting_go::{Instant, Search, Value, slowest};
 use super::modes::hold;
 use crate::engine::pair::{A, C, E};
 use clutch_core::friction::FrictionModel;
@@ -15,7 +16,7 @@ const LIMIT: u32 = 50_000_000;
 /// Slip rate below which a row counts as at rest after an event, as a share of the fastest, and rad/s.
 const AT_REST: f64 = 1e-9;
 /// Acceleration that a held row may have left, as a share of what load and friction make of it.
-const STILL: f64 = 1e-12;
+pub(super) const STILL: f64 = 1e-12;
 
 /// Motion of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +31,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    fn sign(self) -> f64 {
+    pub(super) fn sign(self) -> f64 {
         match self {
             Mode::Stuck => 0.0,
             Mode::Forward => 1.0,
@@ -93,13 +94,13 @@ pub enum SystemError {
 /// A system in motion.
 #[derive(Clone, Debug)]
 pub struct Motion<'a, S, const N: usize, const B: usize> {
-    system: &'a S,
+    pub(super) system: &'a S,
     state: State<N>,
     modes: [Mode; B],
     /// Step that the last stretch ended with, s.
     step: f64,
-    /// Rates at the state, if the last step left them.
-    known: Option<Rates<N>>,
+    /// Rates at the state, and what its rows hold.
+    known: Option<(Rates<N>, Instant<N, B>)>,
     /// Nothing moves, and nothing can until a row lets go.
     at_rest: bool,
     /// Steps and events of one call.
@@ -110,23 +111,28 @@ pub struct Motion<'a, S, const N: usize, const B: usize> {
 type Rates<const N: usize> = [SVector<f64, N>; 2];
 
 /// The equations at a state.
-struct Equations<const N: usize, const B: usize> {
-    inverse: SMatrix<f64, N, N>,
-    rows: SMatrix<f64, B, N>,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equations<const N: usize, const B: usize> {
+    pub(super) inverse: SMatrix<f64, N, N>,
+    pub(super) rows: SMatrix<f64, B, N>,
     /// Acceleration without the friction of the rows that hold.
-    free: SVector<f64, N>,
+    pub(super) free: SVector<f64, N>,
+    /// Normal forces; those below 0 count as 0.
+    pub(super) normal: SVector<f64, B>,
     /// `μ_s N` of each row.
-    bound: SVector<f64, B>,
+    pub(super) bound: SVector<f64, B>,
     /// Slip rates.
-    slip: SVector<f64, B>,
+    pub(super) slip: SVector<f64, B>,
 }
 
 /// A step: its end, its error over the tolerance, rates and equations at the end.
-struct Step<const N: usize, const B: usize> {
+pub(super) struct Step<const N: usize, const B: usize> {
     to: State<N>,
     error: f64,
     rates: Rates<N>,
-    equations: Equations<N, B>,
+    pub(super) equations: Equations<N, B>,
+    /// Loads and bounds after 0.3 and 0.8 of the step, where the stages are of second order; none of what rests.
+    pub(super) between: Option<[Value<N, B>; 2]>,
 }
 
 /// Directions that stuck rows span, orthonormal by `M⁻¹`, with the velocity that each has to have.
@@ -253,17 +259,18 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         let inverse = inertia.cholesky().ok_or(SystemError::Inertia(*time))?.inverse();
         let rows = self.system.rows(position);
         let slip = rows * velocity - self.system.base(*time);
-        let normal = self.system.normal(*time).map(|n| n.max(0.0));
-        let bound = SVector::<f64, B>::from_fn(|i, _| self.system.friction(i).at_rest() * normal[i]);
-        let rubs = self.rubs(&slip, &normal);
+        let normal = self.system.normal(*time);
+        let presses = normal.map(|n| n.max(0.0));
+        let bound = SVector::<f64, B>::from_fn(|i, _| self.system.friction(i).at_rest() * presses[i]);
+        let rubs = self.rubs(&slip, &presses);
         let free = inverse * (self.system.applied(*time, position, velocity) - rows.transpose() * rubs);
         if !free.iter().all(|a| a.is_finite()) {
             return Err(SystemError::NotFinite(*time));
         }
-        Ok(Equations { inverse, rows, free, bound, slip })
+        Ok(Equations { inverse, rows, free, normal, bound, slip })
     }
 
-    fn stuck(&self) -> [bool; B] {
+    pub(super) fn stuck(&self) -> [bool; B] {
         self.modes.map(|mode| mode == Mode::Stuck)
     }
 
@@ -273,28 +280,6 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         }
         let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
         [state.velocity, span.project(&e.inverse, &e.free, 0.0)]
-    }
-
-    /// Accelerations that friction leaves to stuck rows; each below [`STILL`] while they hold.
-    fn left(&self, e: &Equations<N, B>, stuck: &[bool; B]) -> (SVector<f64, B>, f64) {
-        let a = e.rows * e.inverse * e.rows.transpose();
-        let b = e.rows * e.free;
-        let both = |i: usize| b[i].abs() + a[(i, i)] * e.bound[i];
-        let largest = (0..B).filter(|i| stuck[*i]).fold(0.0_f64, |most, i| most.max(both(i)));
-        (hold(&a, &b, &e.bound, stuck).acceleration, STILL * largest)
-    }
-
-    /// True if a row that slipped has come to rest, or one that is stuck is no longer held.
-    fn happened(&self, e: &Equations<N, B>) -> bool {
-        if self.margin(&e.slip) < 0.0 {
-            return true;
-        }
-        let stuck = self.stuck();
-        if stuck.iter().all(|stuck| !stuck) {
-            return false;
-        }
-        let (left, still) = self.left(e, &stuck);
-        (0..B).any(|i| stuck[i] && left[i].abs() > still)
     }
 
     /// Chooses the modes of all rows at rest; `crossed` are those whose rate has just changed its sign.
@@ -321,37 +306,38 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             }
         }
         // Rows that let go get the friction of motion; each lets go once.
+        let mut at = Instant::of(0.0, self.equations(&self.state)?, &self.stuck());
         for _ in 0..=B {
-            let e = self.equations(&self.state)?;
-            let stuck = self.stuck();
-            let (left, still) = self.left(&e, &stuck);
-            let goes: Vec<usize> = (0..B).filter(|i| stuck[*i] && left[*i].abs() > still).collect();
-            if goes.is_empty() {
+            if !at.gone {
                 break;
             }
-            for i in goes {
+            let (stuck, left) = (self.stuck(), at.held.acceleration);
+            for i in (0..B).filter(|i| stuck[*i] && left[*i].abs() > at.still) {
                 self.modes[i] = if left[i] > 0.0 { Mode::Forward } else { Mode::Backward };
             }
+            at = Instant::of(0.0, self.equations(&self.state)?, &self.stuck());
         }
-        let e = self.equations(&self.state)?;
+        let e = &at.equations;
         let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
         self.at_rest = span.directions.len() == N && self.state.velocity.iter().all(|v| *v == 0.0);
+        self.known = Some((self.rate(&self.state, e), at));
         Ok(before)
     }
 
     /// A step of the pair; of what rests, only its end.
-    fn step(&self, h: f64) -> Result<Step<N, B>, SystemError> {
+    pub(super) fn step(&self, h: f64) -> Result<Step<N, B>, SystemError> {
         let from = &self.state;
         if self.at_rest {
             let to = State { time: from.time + h, ..*from };
             let equations = self.equations(&to)?;
-            return Ok(Step { to, error: 0.0, rates: [SVector::zeros(); 2], equations });
+            return Ok(Step { to, error: 0.0, rates: [SVector::zeros(); 2], equations, between: None });
         }
-        let first = match self.known {
-            Some(rates) => rates,
+        let first = match &self.known {
+            Some((rates, _)) => *rates,
             None => self.rate(from, &self.equations(from)?),
         };
         let mut end = None;
+        let mut between = [None; 2];
         let mut k = [first; 7];
         let mut to = *from;
         for i in 0..6 {
@@ -362,6 +348,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             }
             let e = self.equations(&to)?;
             k[i + 1] = self.rate(&to, &e);
+            if i == 1 || i == 2 {
+                between[i - 1] = Some(Value::of(C[i], &e));
+            }
             end = Some(e);
         }
         let left_out =
@@ -380,7 +369,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         // `max` would pass over a number that is none.
         let error = if of_way.is_nan() || of_way > of_speed { of_way } else { of_speed };
         let equations = end.map_or_else(|| self.equations(&to), Ok)?;
-        Ok(Step { to, error, rates: k[6], equations })
+        let [early, late] = between;
+        let between = early.zip(late).map(|(early, late)| [early, late]);
+        Ok(Step { to, error, rates: k[6], equations, between })
     }
 
     /// Follows the motion to a time, s, and adds what happened to `events`.
@@ -394,7 +385,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if now >= to {
                 return Ok(());
             }
-            let corner = self.system.corner(now).filter(|corner| *corner < to);
+            // What jumps at the end of the call does so in it.
+            let corner = self.system.corner(now).filter(|corner| *corner <= to);
             let end = corner.unwrap_or(to);
             let most = self.step.min(self.system.longest_step());
             let last = now + most >= end;
@@ -402,8 +394,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if now + h == now {
                 return Err(SystemError::TooManySteps(now));
             }
-            let Step { to: mut reached, error, rates, equations: mut e } = self.step(h)?;
-            if !(error.is_finite() && reached.velocity.iter().all(|v| v.is_finite())) {
+            let mut step = self.step(h)?;
+            let error = step.error;
+            if !(error.is_finite() && step.to.velocity.iter().all(|v| v.is_finite())) {
                 return Err(SystemError::NotFinite(begin));
             }
             let grown = h * (0.9 * libm::pow(error.max(1e-10), -0.2)).clamp(0.2, 5.0);
@@ -415,33 +408,95 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 self.step = grown;
             }
             if last {
-                reached.time = end;
+                step.to.time = end;
             }
-            let happened = self.happened(&e);
-            if happened {
-                reached = self.locate(h, &e)?;
-                e = self.equations(&reached)?;
+            let jumps = last && corner == Some(end);
+            let (event, at) = self.event(h, &step, jumps)?;
+            if let Some(event) = event {
+                step = self.step(event)?;
             }
             let slipped = self.modes.map(Mode::sign);
-            (self.state, self.known) = (reached, None);
-            if happened || corner == Some(reached.time) {
-                let crossed = std::array::from_fn(|i| slipped[i] * e.slip[i] < 0.0);
+            self.state = step.to;
+            if event.is_some() || jumps {
+                let crossed = std::array::from_fn(|i| slipped[i] * step.equations.slip[i] < 0.0);
                 let before = self.choose(crossed)?;
                 for row in (0..B).filter(|row| before[*row] != self.modes[*row]) {
                     events.push(SystemEvent { time: self.state.time, row, mode: self.modes[row] });
                 }
                 self.step = 1e-6;
             } else {
-                self.known = Some(rates);
+                self.known = Some((step.rates, Instant { at: 0.0, ..at }));
                 let stuck = self.stuck();
                 if stuck.contains(&true) {
-                    let base = self.system.base(self.state.time);
+                    let (base, e) = (self.system.base(self.state.time), &at.equations);
                     let span = Span::of(&e.inverse, &e.rows, &base, &stuck);
                     self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
                 }
             }
         }
         Err(SystemError::TooManySteps(begin))
+    }
+
+    /// The shortest time within a step of `h` after which a row that slipped has come to rest, or one that is stuck is no longer
+    /// held, if there is one; and the end of the step.
+    fn event(
+        &self,
+        h: f64,
+        step: &Step<N, B>,
+        jumps: bool,
+    ) -> Result<(Option<f64>, Instant<N, B>), SystemError> {
+        let stuck = self.stuck();
+        let begin = match &self.known {
+            Some((_, at)) => *at,
+            None => Instant::of(0.0, self.equations(&self.state)?, &stuck),
+        };
+        // What jumps at the end has not done so within the step.
+        let end = if jumps {
+            self.equations(&State { time: step.to.time.next_down(), ..step.to })?
+        } else {
+            step.equations
+        };
+        let mut end = Instant::of(h, end, &stuck);
+        let stops = self.stops(h, &begin.equations, &step.rates, &end.equations)?;
+        let sticks = stuck.contains(&true);
+        let search = sticks.then(|| Search::new(self, (&begin, &end), step, h)).transpose()?;
+        if let Some((before, _)) = stops {
+            if before > 0.0 && sticks {
+                end = Instant::of(before, self.step(before)?.equations, &stuck);
+            } else {
+                end = begin;
+            }
+        }
+        let lets_go = search.map(|mut search| search.first(&begin, &end, 0)).transpose()?.flatten();
+        Ok((lets_go.or(stops.map(|(_, after)| after)), end))
+    }
+
+    /// The time after which a row that slips has come to rest in a step of `h`, and one before it by [`INSTANT`] at most.
+    fn stops(
+        &self,
+        h: f64,
+        begin: &Equations<N, B>,
+        rates: &Rates<N>,
+        end: &Equations<N, B>,
+    ) -> Result<Option<(f64, f64)>, SystemError> {
+        let margin = self.margin(&end.slip);
+        if margin < 0.0 {
+            return self.locate((h, margin)).map(Some);
+        }
+        let Some((first, _)) = &self.known else { return Ok(None) };
+        // A row that stops and slips on within the step.
+        let (gained, gains) = (begin.rows * first[1], end.rows * rates[1]);
+        let mut beyond: Option<(f64, f64)> = None;
+        for i in (0..B).filter(|i| self.modes[*i] != Mode::Stuck) {
+            let sign = self.modes[i].sign();
+            let rate = (sign * begin.slip[i], sign * end.slip[i]);
+            let Some(at) = slowest(h, rate, (sign * gained[i], sign * gains[i])) else { continue };
+            let margin = self.margin(&self.step(at)?.equations.slip);
+            if margin < 0.0 && beyond.is_none_or(|(earliest, _)| at < earliest) {
+                beyond = Some((at, margin));
+            }
+        }
+        beyond.map(|beyond| self.locate(beyond)).transpose()
     }
 
     /// Distance of rows that slip from a rate of 0, rad/s; below 0 once one of them has passed it.
@@ -451,13 +506,13 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         rows.fold(f64::INFINITY, |least, i| least.min(self.modes[i].sign() * slip[i] + noise))
     }
 
-    /// The end of the shortest step at whose end something has happened; `beyond` are the equations at the end of `h`.
+    /// The bracket of the time at which a row that slips comes to rest, before a time at which it has, with its margin.
     ///
-    /// A bracket: by false position (Illinois) on the rates of rows that slip, halved where a row that is stuck lets go.
-    fn locate(&self, h: f64, beyond: &Equations<N, B>) -> Result<State<N>, SystemError> {
+    /// By false position (Illinois) on the rates of rows that slip.
+    fn locate(&self, beyond: (f64, f64)) -> Result<(f64, f64), SystemError> {
         let from = self.system.base(self.state.time);
         let slip = self.system.rows(&self.state.position) * self.state.velocity - from;
-        let (mut before, mut after) = ((0.0, self.margin(&slip)), (h, self.margin(&beyond.slip)));
+        let (mut before, mut after) = ((0.0, self.margin(&slip)), beyond);
         let mut moved_before = None;
         while after.0 - before.0 > INSTANT {
             let share = before.1 / (before.1 - after.1);
@@ -472,9 +527,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if guess <= before.0 || guess >= after.0 {
                 break;
             }
-            let e = self.step(guess)?.equations;
-            let passed = self.happened(&e);
-            let end = (guess, self.margin(&e.slip));
+            let end = (guess, self.margin(&self.step(guess)?.equations.slip));
+            let passed = end.1 < 0.0;
             // The end that stays put for a second time weighs half.
             let again = if moved_before == Some(!passed) { 0.5 } else { 1.0 };
             if passed {
@@ -486,6 +540,6 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             }
             moved_before = Some(!passed);
         }
-        Ok(self.step(after.0)?.to)
+        Ok((before.0, after.0))
     }
 }
