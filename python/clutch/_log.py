@@ -256,8 +256,8 @@ def replay(
         The log, or its file.
     overrides : mapping, optional
         Values for dotted keys of its scenario. The law then gives the commands that it would have given on the same
-        counts: an open loop, which does not predict the motion of the shaft. Other bounds are those against which
-        friction over load is held.
+        counts: an open loop, which does not predict the motion of the shaft. With other bounds friction over
+        load is held against those.
     law : callable or object, optional
         The law of a simulation whose law was written in Python, as for :func:`clutch.simulate`.
 

@@ -1883,7 +1883,8 @@ class HoldLaw(_Params):
     Parameters
     ----------
     margin : float, default 1.25
-        Multiple of the driving torque that a brake holds. `m`: a finite number of at least 1.
+        Multiple of the driving torque that a brake holds; 1 leaves nothing for the converter's rounding. `m`:
+        a finite number of at least 1.
 
     Raises
     ------
@@ -2064,8 +2065,8 @@ class Ramp(_Params):
     Parameters
     ----------
     rate_deg_s : float
-        Rate, to which the velocity jumps at the start. A brake follows only the sign of its drive. A finite
-        number, °/s; a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s.
+        Rate, to which the velocity jumps at the start; with a brake above 0. A finite number, °/s; a finite
+        rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s.
 
     Raises
     ------
@@ -2091,8 +2092,8 @@ class Trapezoid(_Params):
     Parameters
     ----------
     distance_deg : float
-        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
-        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+        Distance. Either sign; with a brake above 0. A finite number, °; a finite distance below 1e12 counts
+        of rig.encoder.counts_per_rev, °.
     speed_deg_s : float
         Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
         rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to be through with
@@ -2127,8 +2128,8 @@ class JerkLimited(_Params):
     Parameters
     ----------
     distance_deg : float
-        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
-        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+        Distance. Either sign; with a brake above 0. A finite number, °; a finite distance below 1e12 counts
+        of rig.encoder.counts_per_rev, °.
     speed_deg_s : float
         Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
         rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to be through with
@@ -2168,8 +2169,8 @@ class MinimumJerk(_Params):
     Parameters
     ----------
     distance_deg : float
-        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
-        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+        Distance. Either sign; with a brake above 0. A finite number, °; a finite distance below 1e12 counts
+        of rig.encoder.counts_per_rev, °.
     duration_s : float
         Time of the path. A number above 0 and at most 1 000 000 s; a time of at least sampling.period_us, s;
         a time in which the highest speed stays below 4e6 counts of rig.encoder.counts_per_rev per
@@ -2424,7 +2425,7 @@ class RunOptions(_Params):
         counts.
     seed : int, default 1
         Seed of everything random: start, ripple phases, noise, a hand. A whole number from 0 to
-        9223372036854776000.
+        9223372036854775807.
     engine : {"auto", "dormand_prince", "exact_flow", "bristle"}, default "auto"
         Engine that integrates the motion. `auto`: The exact flow where the rig allows it, else
         Dormand–Prince; the engine of bristles for a friction that has some. `dormand_prince`: Dormand and

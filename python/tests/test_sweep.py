@@ -564,3 +564,10 @@ def test_a_key_that_does_not_end_with_its_unit_has_it_in_parquet(clutch_with_par
     its = parquet.read_schema(file)
     units = {key: its.field(key).metadata[b"units"].decode() for key in axes}
     assert units == {key: _units.attributes(key)["units"] for key in axes}
+
+
+def test_a_drive_of_any_kind_is_a_value_of_a_sweep():
+    drives = [clutch.WeightDrive(mass_kg=0.2), clutch.BeltDrive(stiffness_nm_rad=0.2, speed_deg_s=0.3)]
+    result = clutch.sweep("pd_2", {"rig.drive": drives, "run.duration_s": [1.2]})
+    errors = result.table["max_error_rad"].tolist()
+    assert len(errors) == 2 and errors[0] != errors[1]

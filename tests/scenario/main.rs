@@ -114,7 +114,7 @@ fn an_unknown_key_is_refused_with_the_nearest_one() {
 
 #[test]
 fn a_wrong_type_is_refused() {
-    refuses(with("law.smc.kp_v", "\"three\""), "my.toml: law.smc.kp_v = \"three\": ", &["expected a number"]);
+    refuses(with("law.smc.kp_v", "\"three\""), "my.toml: law.smc.kp_v = \"three\": ", &["expected a finite number of at least 0 V"]);
     refuses(with("run.seed", "-1"), "my.toml: run.seed = -1: ", &["whole number"]);
     refuses(
         with("run.engine", "fast"),
@@ -228,7 +228,7 @@ fn noise_delay_and_lag_of_a_rig_that_continuous_time_does_not_cover_are_told() {
     assert_eq!(
         outside(&[noise, ("rig.delay_ticks", "1")]),
         [
-            "driving torque ± 4 · 0.002 N m of noise is 0.03909 … 0.05509, bounds 0.04709",
+            "driving torque ± 4 · 0.002 N m of noise is 0.03909 … 0.05509, bounds 0.04709 N m",
             "delay is 1 tick of 1000 µs, bounds none",
         ]
     );
@@ -297,7 +297,7 @@ fn a_table_with_times_that_do_not_rise_names_the_point() {
         "[reference.ramp]\nrate_deg_s = 2.0",
         "[reference.table]\npoints_s_deg = [[0.0, 0.0], [2.0, 1.0], [1.0, 2.0]]",
     );
-    refuses(parse(&text), "my.toml: reference.table.points_s_deg = (point 2): ", &["rise"]);
+    refuses(parse(&text), "my.toml: reference.table.points_s_deg = [1, 2] (point 2): ", &["rise"]);
 }
 
 #[test]
@@ -493,6 +493,26 @@ proptest! {
     }
 }
 
+/// A value that somebody wrote goes before a key that nobody did, and a key of a former version is told as such.
+#[test]
+fn what_is_wrong_goes_before_what_is_missing() {
+    let told = |name: &str, key: &str, value: &str| {
+        Scenario::load(name.as_ref(), &[(key.to_owned(), value.to_owned())]).unwrap_err().to_string()
+    };
+    for (key, value, expected) in [
+        ("safety.limits.jump_deg", "-1", "safety.limits.jump_deg = -1: expected a finite number above 0 °"),
+        ("rig.drive.hand.rms_nm", "-1", "rig.drive.hand.rms_nm = -1: expected a"),
+        ("rig.encoder.counts_per_rev", "2.5", "expected a whole number from 4 to 16 777 216 counts"),
+        ("run.seed", "-1", "a whole number from 0 to 9223372036854775807"),
+        ("safety.limits.stand_still_counts", "3", "unknown key: it is gone, leave it out"),
+        ("model.mu_static", "0.2", "did you mean model.friction.stribeck.mu_static?"),
+        ("law.pid.kp_v_rad", "3", "to choose another, set it as a whole: law={"),
+    ] {
+        let found = told("bench_smc_2", key, value);
+        assert!(found.contains(expected), "{key} = {value}: {found}");
+    }
+}
+
 /// What cannot work: the rig, what it is told to have, and words of the advice.
 #[test]
 fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
@@ -527,6 +547,11 @@ fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
             "or raise the brake's gain or output.highest_v",
         ),
         (
+            "pd_2",
+            ("rig.actuator", "{brake = {gain_nm_v = 0.14, preload_nm = 1.0}}"),
+            "or lower rig.actuator.brake.preload_nm",
+        ),
+        (
             "motor_pid",
             ("rig.drive", "{weight = {mass_kg = 100.0}}"),
             "or raise the actuator's gain or output's limits",
@@ -544,6 +569,11 @@ fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
             "{name} with {set:?}: {found}"
         );
     }
+    // A drive that swings: half of the time it is behind.
+    let swings = ("rig.drive", "{sine = {mean_nm = 0.0, amplitude_nm = 0.05, frequency_hz = 1.0}}");
+    let found = reason("pd_2", &[swings]).unwrap();
+    assert!(found.starts_with("no voltage keeps this rig's shaft on the path for 5"), "{found}");
+    assert!(found.contains(" % of the run, first at "), "{found}");
     for built_in in BUILT_IN {
         assert_eq!(reason(built_in.name, &[]), None, "{}", built_in.name);
     }

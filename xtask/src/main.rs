@@ -361,6 +361,7 @@ fn check() -> Result<()> {
     tool("ruff").args(["format", "--check"]).args(python::SOURCES).run()?;
     tool("ruff").arg("check").args(python::SOURCES).run()?;
     tool("typos").run()?;
+    rehearse::check()?;
     for manifest in ["Cargo.toml", "firmware/Cargo.toml"] {
         // A permission that nothing needs any more is an error, too.
         let deny = [

@@ -30,6 +30,21 @@ const TESTS: &str = "tests";
 /// Tests of pages that show the output of commands, or the bits of all runs: a person puts a new figure there.
 const OF_PAGES: [&str; 4] = ["--skip", "that_the_docs_show", "--skip", "of_the_page"];
 
+/// Fails if the patches no longer fit the tree as it is.
+pub(crate) fn check() -> Result<()> {
+    let names = ADDITIONS.iter().map(|addition| addition.patch).chain([TESTS]);
+    let patches = names.map(|name| std::fs::read_to_string(patch(name)));
+    // As one: a later patch may touch what an earlier one has.
+    let all = root().join("target/rehearsal.patch");
+    std::fs::write(&all, patches.collect::<std::io::Result<String>>()?)?;
+    let git = program("git").within(&root()).args(["apply", "--check", "--whitespace=nowarn"]).arg(&all);
+    git.run().context("a patch of xtask/rehearsal does not fit any more: make it anew")
+}
+
+fn patch(name: &str) -> PathBuf {
+    root().join("xtask/rehearsal").join(format!("{name}.patch"))
+}
+
 pub(crate) fn run() -> Result<()> {
     let tree = root().join("target/rehearsal/tree");
     copy::last_commit(&tree)?;
@@ -64,7 +79,7 @@ struct Touched {
 
 /// Applies a patch; the files that it touches.
 fn apply(tree: &Path, name: &str) -> Result<Vec<Touched>> {
-    let patch = root().join("xtask/rehearsal").join(format!("{name}.patch"));
+    let patch = patch(name);
     let text = std::fs::read_to_string(&patch).with_context(|| patch.display().to_string())?;
     // Not one of this repository: git would look for the paths in its root.
     let git = program("git").within(tree).env("GIT_CEILING_DIRECTORIES", root().join("target"));

@@ -497,6 +497,24 @@ fn a_path_that_a_brake_cannot_follow_is_said_in_words() {
 }
 
 #[test]
+fn a_file_that_cannot_be_written_is_refused_before_the_search() {
+    let dir = folder("no_room");
+    let file = dir.join("missing").join("a.toml");
+    let file = file.to_str().unwrap();
+    for args in [
+        ["tune", "pd_2", "--out", file],
+        ["tune", "pd_2", "--save", dir.to_str().unwrap()],
+        ["identify", "board_smc_2", "--out", file],
+        ["map", "pd_2", "--html", file],
+    ] {
+        let o = clutch(&args);
+        assert_eq!(o.status.code(), Some(1), "{args:?}");
+        assert!(err(&o).contains(": cannot be written: it"), "{args:?}: {}", err(&o));
+        assert!(out(&o).is_empty(), "{args:?}");
+    }
+}
+
+#[test]
 fn reproduce_names_a_folder_that_it_cannot_make() {
     let dir = folder("reproduce");
     let file = dir.join("a_file");

@@ -1,4 +1,4 @@
-//! Healthy runs: shafts drawn from anywhere inside wide bounds, under every law, with lines that lose, delay and jitter.
+//! Healthy runs: shafts drawn from anywhere inside wide bounds, under laws of each kind, with lines that lose, delay and jitter.
 //! Nothing is broken, so that the supervisor's envelope may end none of them.
 
 use crate::campaign::CampaignError;

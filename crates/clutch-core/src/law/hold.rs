@@ -13,7 +13,7 @@ crate::params! {
     /// A voltage that holds the resting shaft, whatever the encoder says: with a brake a multiple of the lowest that does,
     /// with a motor the one that balances the drive.
     pub struct HoldParams<T>: Default {
-        /// Multiple of the driving torque that a brake holds.
+        /// Multiple of the driving torque that a brake holds; 1 leaves nothing for the converter's rounding.
         margin: T = 1.25, "margin" "m" NONE, Range::at_least(1.0);
     }
 }

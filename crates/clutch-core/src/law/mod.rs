@@ -137,7 +137,7 @@ pub trait ControlLaw<T: Arithmetic> {
     }
 
     /// Called before each period, and once after [`ControlLaw::start`], with the facts behind the measurement. Most laws need
-    /// none of them, and do not ask: the voltage of a code is computed for who does.
+    /// none of them, and do not ask: the voltage of a code is computed where it is asked for.
     #[inline]
     fn sees(&self, state: &mut Self::State, seen: impl FnOnce() -> Seen<T>) {
         let _ = (state, seen);

@@ -208,8 +208,8 @@ const GONE: [&str; 1] = ["safety.limits.stand_still_counts"];
 pub(crate) fn with_todays_keys(table: &mut Table) {
     let take = |table: &mut Table, path: &str| {
         let (below, key) = path.rsplit_once('.').unwrap_or(("", path));
-        let parts = below.split('.').filter(|part| !part.is_empty());
-        parts.fold(Some(table), |at, part| at?.get_mut(part)?.as_table_mut())?.remove(key)
+        let mut parts = below.split('.').filter(|part| !part.is_empty());
+        parts.try_fold(table, |at, part| at.get_mut(part)?.as_table_mut())?.remove(key)
     };
     for path in GONE {
         let _ = take(table, path);
