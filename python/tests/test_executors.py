@@ -410,6 +410,26 @@ def test_a_future_of_ray_that_is_cancelled_while_a_thread_waits_for_it_gives_tha
             future.result()
 
 
+def test_a_task_of_ray_that_ends_while_it_is_cancelled_is_cancelled_for_the_thread_that_waits():
+    class Ray:
+        """Ends the task within the call that cancels it, before that call returns."""
+
+        exceptions = needed("ray").exceptions
+
+        def wait(self, references, timeout):
+            return [], references
+
+        def cancel(self, reference):
+            with pytest.raises(concurrent.futures.CancelledError):
+                future.result()
+
+        def get(self, reference):
+            raise RuntimeError("interrupted")
+
+    future = executors._RayFuture(Ray(), "reference")
+    assert future.cancel()
+
+
 def test_a_ray_that_runs_already_is_left_running(ray):
     with executors.RayExecutor() as second:
         assert second.submit(abs, -1).result() == 1

@@ -114,7 +114,11 @@ fn an_unknown_key_is_refused_with_the_nearest_one() {
 
 #[test]
 fn a_wrong_type_is_refused() {
-    refuses(with("law.smc.kp_v", "\"three\""), "my.toml: law.smc.kp_v = \"three\": ", &["expected a finite number of at least 0 V"]);
+    refuses(
+        with("law.smc.kp_v", "\"three\""),
+        "my.toml: law.smc.kp_v = \"three\": ",
+        &["expected a finite number of at least 0 V"],
+    );
     refuses(with("run.seed", "-1"), "my.toml: run.seed = -1: ", &["whole number"]);
     refuses(
         with("run.engine", "fast"),
