@@ -97,8 +97,8 @@ fn reason(s: Shortfall) -> &'static str {
         }
         Shortfall::Slope => "the surface's slope f is below C_d/J: raise K_p against K_d",
         Shortfall::Surface => {
-            "the law has no sliding surface, of which the certificate speaks: one has a law with gains above 0 on the error \
-             and on its rate, and no integral"
+            "the law has no sliding surface, of which the certificate speaks: a law has one that has gains above 0 on the \
+             error and on its rate, and no integral"
         }
         _ => "not certified",
     }

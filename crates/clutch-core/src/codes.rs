@@ -35,7 +35,7 @@ impl FixedCounts {
     /// A whole number of counts.
     #[inline]
     #[must_use]
-    pub fn from_counts(counts: i64) -> FixedCounts {
+    pub const fn from_counts(counts: i64) -> FixedCounts {
         FixedCounts(counts.wrapping_shl(Self::FRACTION_BITS))
     }
 

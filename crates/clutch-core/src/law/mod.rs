@@ -188,7 +188,7 @@ pub struct Beside<'a, T> {
 impl<'a, T: Real> Beside<'a, T> {
     /// The paper's encoder and sampling period.
     #[must_use]
-    pub fn paper(model: &'a PlantParams<T>, output: &'a OutputParams<T>) -> Self {
+    pub const fn paper(model: &'a PlantParams<T>, output: &'a OutputParams<T>) -> Self {
         Beside { model, output, encoder: Encoder::PAPER, period: Micros(1000) }
     }
 

@@ -59,7 +59,7 @@ impl<T: Real> OutputParams<T> {
 
     /// The default output stage with these limits, V; an invalid demand brakes with the higher.
     #[must_use]
-    pub fn within(lowest: T, highest: T) -> Self {
+    pub const fn within(lowest: T, highest: T) -> Self {
         OutputParams { lowest, highest, on_invalid: highest, bumpless_time: T::ZERO }
     }
 }

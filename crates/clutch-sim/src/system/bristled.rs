@@ -5,7 +5,7 @@
 //! ```
 
 use super::System;
-use super::motion::{State, SystemError};
+use super::state::{State, SystemError};
 use crate::engine::rosenbrock::{self, Linear};
 use clutch_core::friction::{Bend, Bristles, FrictionModel};
 use nalgebra::SVector;

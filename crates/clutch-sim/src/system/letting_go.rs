@@ -7,7 +7,7 @@
 
 use super::System;
 use super::modes::{Held, hold};
-use super::motion::{Equations, INSTANT, Motion, STILL, Step, SystemError};
+use super::state::{Equations, INSTANT, Mode, STILL, SystemError};
 use clutch_core::friction::FrictionModel;
 use nalgebra::SVector;
 
@@ -143,9 +143,22 @@ fn bend<const N: usize, const B: usize, const D: usize>(
     first.zip_map(&last, |a, b| DOUBT * (a.abs().max(b.abs()) + (a - b).abs()))
 }
 
+/// A step that is searched.
+pub(super) struct Stretch<'m, S, const N: usize, const B: usize> {
+    pub(super) system: &'m S,
+    /// Time at which it begins, and its length, s.
+    pub(super) from: f64,
+    pub(super) length: f64,
+    pub(super) modes: [Mode; B],
+    /// Loads and bounds within it; none of what rests.
+    pub(super) between: Option<[Value<N, B>; 2]>,
+    /// The equations after a time within it, s.
+    pub(super) equations_after: &'m dyn Fn(f64) -> Result<Equations<N, B>, SystemError>,
+}
+
 /// A search for the first instant of a step at which a stuck row lets go.
-pub(super) struct Search<'m, 'a, S, const N: usize, const B: usize> {
-    motion: &'m Motion<'a, S, N, B>,
+pub(super) struct Search<'m, S, const N: usize, const B: usize> {
+    stretch: Stretch<'m, S, N, B>,
     stuck: [bool; B],
     /// The most that the torques bend which take up the load, N m/s².
     loads: SVector<f64, B>,
@@ -159,37 +172,33 @@ pub(super) struct Search<'m, 'a, S, const N: usize, const B: usize> {
     asked: u32,
 }
 
-impl<'m, 'a, S: System<N, B>, const N: usize, const B: usize> Search<'m, 'a, S, N, B> {
+impl<'m, S: System<N, B>, const N: usize, const B: usize> Search<'m, S, N, B> {
     /// A search over a step, between its begin and its end.
     pub(super) fn new(
-        motion: &'m Motion<'a, S, N, B>,
+        stretch: Stretch<'m, S, N, B>,
         (a, b): (&Instant<N, B>, &Instant<N, B>),
-        step: &Step<N, B>,
-        h: f64,
     ) -> Result<Self, SystemError> {
-        let (system, stuck) = (motion.system, motion.stuck());
+        let Stretch { system, from, length: h, modes, between, equations_after } = stretch;
+        let stuck = modes.map(|mode| mode == Mode::Stuck);
         let (begin, end) = (&a.equations, &b.equations);
-        let from = motion.state().time;
         let told = system.curvature(from, from + h);
         let (mut load, mut normal) = told.unwrap_or_else(|| (SVector::zeros(), SVector::zeros()));
         // What moves bends the load, too: no bound of that is known, and its values within the step are looked at.
         let (first, last) = (Value::of(0.0, begin), Value::of(1.0, end));
-        let seen = match step.between {
+        let seen = match between {
             Some([early, late]) => Some([first, early, late, last]),
             // Nothing moves, and nobody knows the loads: three values are enough.
-            None if told.is_none() => {
-                Some([first, Value::of(0.5, &motion.step(0.5 * h)?.equations), last, last])
-            }
+            None if told.is_none() => Some([first, Value::of(0.5, &equations_after(0.5 * h)?), last, last]),
             None => None,
         };
-        let seen = seen.as_ref().map(|seen| if step.between.is_some() { &seen[..] } else { &seen[..3] });
+        let seen = seen.as_ref().map(|seen| if between.is_some() { &seen[..] } else { &seen[..3] });
         let per_square = 1.0 / (h * h);
         if let (Some(seen), None) = (seen, told) {
             normal = bend(seen, |value| value.normal) * per_square;
         }
         let friction = |i: usize| system.friction(i);
         for i in (0..B).filter(|i| normal[*i] > 0.0 && !stuck[*i]) {
-            let sign = motion.modes()[i].sign();
+            let sign = modes[i].sign();
             let slides = friction(i).level((sign * end.slip[i]).max(0.0)) * normal[i];
             load += end.rows.row(i).transpose().abs() * slides;
         }
@@ -197,7 +206,7 @@ impl<'m, 'a, S: System<N, B>, const N: usize, const B: usize> Search<'m, 'a, S, 
             if stuck[i] && normal[i] > 0.0 { friction(i).at_rest() * normal[i] } else { 0.0 }
         });
         let mut search = Search {
-            motion,
+            stretch,
             stuck,
             loads: SVector::zeros(),
             bounds,
@@ -238,7 +247,7 @@ impl<'m, 'a, S: System<N, B>, const N: usize, const B: usize> Search<'m, 'a, S, 
         if width <= INSTANT || at <= a.at || at >= b.at {
             return Ok(b.gone.then_some(b.at));
         }
-        let middle = Instant::of(at, self.motion.step(at)?.equations, &self.stuck);
+        let middle = Instant::of(at, (self.stretch.equations_after)(at)?, &self.stuck);
         if !b.gone {
             self.asked -= 1;
         }

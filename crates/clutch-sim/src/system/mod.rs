@@ -18,10 +18,12 @@ mod bristled;
 mod letting_go;
 mod modes;
 mod motion;
+mod state;
 
 pub use bristled::BristledMotion;
 pub use modes::{Held, hold};
-pub use motion::{INSTANT, Mode, Motion, State, SystemError, SystemEvent};
+pub use motion::{Motion, SystemEvent};
+pub use state::{INSTANT, Mode, State, SystemError};
 
 use clutch_core::Friction;
 use nalgebra::{SMatrix, SVector};

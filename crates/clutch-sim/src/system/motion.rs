@@ -1,56 +1,19 @@
 //! The motion of a system from event to event.
 
 use super::System;
-use super::letting_go::{Instant, Search, Value, slowest};
+use super::letting_go::{Instant, Search, Stretch, Value, slowest};
 use super::modes::hold;
+use super::state::{Equations, INSTANT, Mode, State, SystemError};
 use crate::engine::pair::{A, C, E};
 use clutch_core::friction::FrictionModel;
 use nalgebra::{SMatrix, SVector};
 
-/// An event is located to this, s.
-pub const INSTANT: f64 = 1e-12;
 /// Error allowed per step, in rad and rad/s, and as a share of both.
 const TOLERANCE: f64 = 1e-11;
 /// Steps and events of one call before the motion is given up.
 const LIMIT: u32 = 50_000_000;
 /// Slip rate below which a row counts as at rest after an event, as a share of the fastest, and rad/s.
 const AT_REST: f64 = 1e-9;
-/// Acceleration that a held row may have left, as a share of what load and friction make of it.
-pub(super) const STILL: f64 = 1e-12;
-
-/// Motion of a row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// Held: its slip rate is 0.
-    #[default]
-    Stuck,
-    /// Slips with a rate at or above 0.
-    Forward,
-    /// Slips with a rate at or below 0.
-    Backward,
-}
-
-impl Mode {
-    pub(super) fn sign(self) -> f64 {
-        match self {
-            Mode::Stuck => 0.0,
-            Mode::Forward => 1.0,
-            Mode::Backward => -1.0,
-        }
-    }
-}
-
-/// Positions and velocities at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State<const N: usize> {
-    /// s
-    pub time: f64,
-    /// rad
-    pub position: SVector<f64, N>,
-    /// rad/s
-    pub velocity: SVector<f64, N>,
-}
-
 /// A row that began to hold or to slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SystemEvent {
@@ -62,39 +25,10 @@ pub struct SystemEvent {
     pub mode: Mode,
 }
 
-/// A motion could not be followed.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SystemError {
-    /// Too many steps or events.
-    #[error("the motion after t = {0} s needs too many steps: a parameter is out of all proportion")]
-    TooManySteps(f64),
-    /// The state is no longer a number.
-    #[error("the motion after t = {0} s left the range of numbers")]
-    NotFinite(f64),
-    /// The inertia is none.
-    #[error("the inertia at t = {0} s is not symmetric and positive definite")]
-    Inertia(f64),
-    /// The friction of a row has bristles.
-    #[error(
-        "row {0} has a friction with bristles, which bend before it slides: expected one that sticks exactly"
-    )]
-    Bristles(usize),
-    /// The friction of a row has none.
-    #[error(
-        "row {0} has a friction without bristles: expected one with bristles, of one element, in every row"
-    )]
-    NoBristles(usize),
-    /// The friction of a row has several elements.
-    #[error(
-        "row {0} has a friction of several elements: expected one with bristles, of one element, in every row"
-    )]
-    Elements(usize),
-}
-
 /// A system in motion.
 #[derive(Clone, Debug)]
 pub struct Motion<'a, S, const N: usize, const B: usize> {
-    pub(super) system: &'a S,
+    system: &'a S,
     state: State<N>,
     modes: [Mode; B],
     /// Step that the last stretch ended with, s.
@@ -109,21 +43,6 @@ pub struct Motion<'a, S, const N: usize, const B: usize> {
 
 /// Velocity and acceleration.
 type Rates<const N: usize> = [SVector<f64, N>; 2];
-
-/// The equations at a state.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Equations<const N: usize, const B: usize> {
-    pub(super) inverse: SMatrix<f64, N, N>,
-    pub(super) rows: SMatrix<f64, B, N>,
-    /// Acceleration without the friction of the rows that hold.
-    pub(super) free: SVector<f64, N>,
-    /// Normal forces; those below 0 count as 0.
-    pub(super) normal: SVector<f64, B>,
-    /// `μ_s N` of each row.
-    pub(super) bound: SVector<f64, B>,
-    /// Slip rates.
-    pub(super) slip: SVector<f64, B>,
-}
 
 /// A step: its end, its error over the tolerance, rates and equations at the end.
 pub(super) struct Step<const N: usize, const B: usize> {
@@ -459,7 +378,16 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         let mut end = Instant::of(h, end, &stuck);
         let stops = self.stops(h, &begin.equations, &step.rates, &end.equations)?;
         let sticks = stuck.contains(&true);
-        let search = sticks.then(|| Search::new(self, (&begin, &end), step, h)).transpose()?;
+        let equations_after = |time: f64| Ok(self.step(time)?.equations);
+        let stretch = Stretch {
+            system: self.system,
+            from: self.state.time,
+            length: h,
+            modes: self.modes,
+            between: step.between,
+            equations_after: &equations_after,
+        };
+        let search = sticks.then(|| Search::new(stretch, (&begin, &end))).transpose()?;
         if let Some((before, _)) = stops {
             if before > 0.0 && sticks {
                 end = Instant::of(before, self.step(before)?.equations, &stuck);
