@@ -313,6 +313,18 @@ fn values_that_no_loop_has_are_refused_by_name() {
 }
 
 #[test]
+fn a_cell_whose_slow_speeds_end_elsewhere_is_refused() {
+    let good = good();
+    assert!(check(&good).is_ok());
+    // Lower, and more of the fall is left at fast speeds; higher, and more speeds are slow.
+    for share in [0.4, 3.0] {
+        let mut other = good.clone();
+        other.cells[0].slow_exponent *= share;
+        assert!(check(&other).is_err(), "{share} times the exponent");
+    }
+}
+
+#[test]
 fn a_noise_that_turns_the_drive_round_is_refused_whatever_the_proofs_say() {
     let mut turned = good();
     turned.setup.torque_noise = turned.setup.drive_torque[0];
