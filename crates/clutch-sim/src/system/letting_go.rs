@@ -7,6 +7,7 @@
 
 use super::System;
 use super::modes::{Held, hold};
+use super::span::Span;
 use super::state::{Equations, INSTANT, Mode, STILL, SystemError};
 use clutch_core::friction::FrictionModel;
 use nalgebra::SVector;
@@ -57,62 +58,6 @@ fn left<const N: usize, const B: usize>(
     let both = |i: usize| b[i].abs() + a[(i, i)] * e.bound[i];
     let largest = (0..B).filter(|i| stuck[*i]).fold(0.0_f64, |most, i| most.max(both(i)));
     (hold(&a, &b, bound, stuck), STILL * largest)
-}
-
-/// Independent rows that take up what is added to the load; they span what all stuck rows span.
-struct Carriers<const N: usize, const B: usize> {
-    /// Orthonormal by `M⁻¹`.
-    directions: [SVector<f64, N>; N],
-    /// Torques of the rows whose sum is that direction.
-    shares: [SVector<f64, B>; N],
-    count: usize,
-}
-
-impl<const N: usize, const B: usize> Carriers<N, B> {
-    /// The rows that can hold most come first; one of weight 0 holds nothing.
-    fn of(e: &Equations<N, B>, weight: &SVector<f64, B>) -> Self {
-        let mut carriers =
-            Carriers { directions: [SVector::zeros(); N], shares: [SVector::zeros(); N], count: 0 };
-        let mut rest: [SVector<f64, N>; B] = std::array::from_fn(|i| e.rows.row(i).transpose());
-        let mut share: [SVector<f64, B>; B] =
-            std::array::from_fn(|i| SVector::from_fn(|j, _| f64::from(u8::from(i == j))));
-        let length = |x: &SVector<f64, N>| x.dot(&(e.inverse * x)).max(0.0).sqrt();
-        let whole: [f64; B] = std::array::from_fn(|i| length(&rest[i]));
-        let mut open: [bool; B] = std::array::from_fn(|i| weight[i] > 0.0 && whole[i] > 0.0);
-        while carriers.count < N {
-            let strength = |i: usize| weight[i] * length(&rest[i]);
-            let Some(next) = (0..B).filter(|i| open[*i]).max_by(|i, j| strength(*i).total_cmp(&strength(*j)))
-            else {
-                break;
-            };
-            open[next] = false;
-            let unit = length(&rest[next]);
-            // A row in the span of the others carries nothing more.
-            if unit <= 1e-9 * whole[next] {
-                continue;
-            }
-            let (direction, shares) = (rest[next] / unit, share[next] / unit);
-            let turned = e.inverse * direction;
-            for i in (0..B).filter(|i| open[*i]) {
-                // Twice: once leaves what rounding puts in.
-                for _ in 0..2 {
-                    let along = turned.dot(&rest[i]);
-                    rest[i] -= direction * along;
-                    share[i] -= shares * along;
-                }
-            }
-            carriers.directions[carriers.count] = direction;
-            carriers.shares[carriers.count] = shares;
-            carriers.count += 1;
-        }
-        carriers
-    }
-
-    /// Torques of the rows that take up a load, of the acceleration that it would make.
-    fn torque(&self, acceleration: &SVector<f64, N>) -> SVector<f64, B> {
-        let both = self.directions.iter().zip(&self.shares).take(self.count);
-        both.fold(SVector::zeros(), |sum, (d, share)| sum + share * d.dot(acceleration))
-    }
 }
 
 /// What loads and bounds are within a step.
@@ -220,8 +165,8 @@ impl<'m, S: System<N, B>, const N: usize, const B: usize> Search<'m, S, N, B> {
                 let most = begin.normal[i].max(end.normal[i]) + 0.125 * normal[i] * h * h;
                 if stuck[i] { friction(i).at_rest() * most.max(0.0) } else { 0.0 }
             });
-            let carriers = Carriers::of(end, &weight);
-            search.redundant = carriers.count < (0..B).filter(|i| weight[*i] > 0.0).count();
+            let carriers = Span::of(&end.inverse, &end.rows, &weight);
+            search.redundant = carriers.count() < (0..B).filter(|i| weight[*i] > 0.0).count();
             for j in (0..N).filter(|j| load[*j] > 0.0) {
                 search.loads += carriers.torque(&end.inverse.column(j).into_owned()).abs() * load[j];
             }

@@ -18,6 +18,7 @@ mod bristled;
 mod letting_go;
 mod modes;
 mod motion;
+mod span;
 mod state;
 
 pub use bristled::BristledMotion;

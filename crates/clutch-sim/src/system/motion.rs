@@ -3,10 +3,11 @@
 use super::System;
 use super::letting_go::{Instant, Search, Stretch, Value, slowest};
 use super::modes::hold;
+use super::span::Span;
 use super::state::{Equations, INSTANT, Mode, State, SystemError};
 use crate::engine::pair::{A, C, E};
 use clutch_core::friction::FrictionModel;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// Error allowed per step, in rad and rad/s, and as a share of both.
 const TOLERANCE: f64 = 1e-11;
@@ -52,64 +53,6 @@ pub(super) struct Step<const N: usize, const B: usize> {
     pub(super) equations: Equations<N, B>,
     /// Loads and bounds after 0.3 and 0.8 of the step, where the stages are of second order; none of what rests.
     pub(super) between: Option<[Value<N, B>; 2]>,
-}
-
-/// Directions that stuck rows span, orthonormal by `M⁻¹`, with the velocity that each has to have.
-struct Span<const N: usize> {
-    directions: Vec<(SVector<f64, N>, f64)>,
-}
-
-impl<const N: usize> Span<N> {
-    fn of<const B: usize>(
-        inverse: &SMatrix<f64, N, N>,
-        rows: &SMatrix<f64, B, N>,
-        base: &SVector<f64, B>,
-        stuck: &[bool; B],
-    ) -> Self {
-        let mut directions: Vec<(SVector<f64, N>, f64)> = Vec::new();
-        for i in (0..B).filter(|i| stuck[*i]) {
-            let (mut row, mut rate) = (rows.row(i).transpose(), base[i]);
-            let whole = (row.transpose() * inverse * row)[0].sqrt();
-            // Twice: once leaves what rounding puts in.
-            for _ in 0..2 {
-                for (d, r) in &directions {
-                    let share = (row.transpose() * inverse * d)[0];
-                    row -= d * share;
-                    rate -= r * share;
-                }
-            }
-            let left = (row.transpose() * inverse * row)[0].sqrt();
-            // A row in the span of the others holds nothing more.
-            if left > 1e-9 * whole {
-                directions.push((row / left, rate / left));
-            }
-        }
-        Span { directions }
-    }
-
-    /// A velocity with the rates that stuck rows have to have; `moves` is 0 for an acceleration.
-    fn project(&self, inverse: &SMatrix<f64, N, N>, x: &SVector<f64, N>, moves: f64) -> SVector<f64, N> {
-        if self.directions.is_empty() {
-            return *x;
-        }
-        if self.directions.len() == N
-            && moves * self.directions.iter().fold(0.0, |m, (_, r)| r.abs().max(m)) == 0.0
-        {
-            return SVector::zeros();
-        }
-        let mut y = *x;
-        for _ in 0..2 {
-            for (d, rate) in &self.directions {
-                y -= inverse * d * ((d.transpose() * y)[0] - moves * rate);
-            }
-        }
-        // A rest that is rounding of a number that is gone is 0.
-        let least = 8.0 * f64::EPSILON * x.amax();
-        if !least.is_finite() {
-            return y;
-        }
-        y.map(|v| if v.abs() <= least { 0.0 } else { v })
-    }
 }
 
 impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
@@ -197,8 +140,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         if !self.stuck().contains(&true) {
             return [state.velocity, e.free];
         }
-        let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
-        [state.velocity, span.project(&e.inverse, &e.free, 0.0)]
+        let span = Span::of_stuck(&e.inverse, &e.rows, &self.stuck());
+        [state.velocity, span.project(&e.inverse, &e.free, &SVector::zeros())]
     }
 
     /// Chooses the modes of all rows at rest; `crossed` are those whose rate has just changed its sign.
@@ -213,8 +156,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         });
         // Rows in the span of those at rest are at rest, too.
         let base = self.system.base(self.state.time);
-        let span = Span::of(&e.inverse, &e.rows, &base, &rests);
-        self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+        let span = Span::of_stuck(&e.inverse, &e.rows, &rests);
+        self.state.velocity = span.project(&e.inverse, &self.state.velocity, &base);
         let slip = e.rows * self.state.velocity - base;
         for i in 0..B {
             rests[i] |= slip[i].abs() <= AT_REST * AT_REST * fastest.max(1.0);
@@ -237,8 +180,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             at = Instant::of(0.0, self.equations(&self.state)?, &self.stuck());
         }
         let e = &at.equations;
-        let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
-        self.at_rest = span.directions.len() == N && self.state.velocity.iter().all(|v| *v == 0.0);
+        let span = Span::of_stuck(&e.inverse, &e.rows, &self.stuck());
+        self.at_rest = span.count() == N && self.state.velocity.iter().all(|v| *v == 0.0);
         self.known = Some((self.rate(&self.state, e), at));
         Ok(before)
     }
@@ -348,8 +291,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 let stuck = self.stuck();
                 if stuck.contains(&true) {
                     let (base, e) = (self.system.base(self.state.time), &at.equations);
-                    let span = Span::of(&e.inverse, &e.rows, &base, &stuck);
-                    self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+                    let span = Span::of_stuck(&e.inverse, &e.rows, &stuck);
+                    self.state.velocity = span.project(&e.inverse, &self.state.velocity, &base);
                 }
             }
         }
