@@ -1,6 +1,6 @@
 """Runs every notebook and keeps its outputs in it, as ``cargo xtask notebooks`` does.
 
-Run it in any folder, with the package installed: ``python docs/notebooks.py``. What is kept are texts, tables and
+Run it in any folder, with the package installed: ``python docs/notebooks.py``. Kept are texts, tables and
 pictures of few colours; times, counts of other runs and what was written to stderr are not. A checksum of the sources
 stands in the notebook's metadata: a test holds it against the cells.
 """

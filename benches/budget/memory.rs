@@ -11,7 +11,7 @@ const RAM: u32 = 0x2000_0000;
 const EXCEPTION: u64 = 104 + 4;
 
 /// A period, in the images that are flashed. The code that polls the task calls through registers, and has no bound.
-const PERIOD: &str = "clutch_node::hardware::tick";
+const PERIOD: &str = "clutch_node::board_program::tick";
 
 /// Prints flash, static RAM and a period's stack of an image that is flashed; gives the values over budget.
 ///

@@ -22,7 +22,7 @@ ATOL = (1e-15, 1e-13)  # rad within one period, rad/s
 TURN = 2.0 * math.pi
 
 
-# --- What drives the shaft ---------------------------------------------------------------------
+# --- Drives of the shaft -----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

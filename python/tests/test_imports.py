@@ -80,7 +80,7 @@ def modules(module):
 
 
 def leaves(tree):
-    """What a `use` names: of `a::{b, c as d}` a::b, called b, and a::c, called d."""
+    """Names in a `use`: of `a::{b, c as d}` a::b, called b, and a::c, called d."""
     head, brace, rest = tree.partition("{")
     if not brace:
         path, _, alias = tree.partition(" as ")

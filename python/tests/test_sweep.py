@@ -55,7 +55,7 @@ def assert_rows_are_single_runs(base, result):
         assert result.table["certified"][i] == bool(run.scenario.certificate())
 
 
-# --- What is run -------------------------------------------------------------------------------
+# --- Rows to run -------------------------------------------------------------------------------
 
 
 def test_a_row_is_bit_for_bit_what_simulate_gives_for_it():
@@ -171,7 +171,7 @@ def test_a_sweep_needs_keys_and_values(short):
             clutch.sweep(short, {"law.smc.kp_v": [3.0]}, **{option: 0})
 
 
-# --- What comes out ----------------------------------------------------------------------------
+# --- Results -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7, None])
@@ -401,7 +401,7 @@ def test_a_bar_is_shown_on_a_terminal_only_and_only_for_long_sweeps(short, monke
     assert ("3 of 3 runs" in shown["long"]) != with_tqdm
 
 
-# --- What must not happen ------------------------------------------------------------------------
+# --- Refusals and races --------------------------------------------------------------------------
 
 
 def outcome(code):

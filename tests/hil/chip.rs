@@ -3,7 +3,7 @@
 
 use crate::{beside, equal, on, simulate};
 use clutch_core::supervisor::{Cause, State};
-use clutch_loop::chip::{
+use clutch_loop::chip_board::{
     ChipBoard, ChipFault, ChipFaultKind, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession,
 };
 use clutch_loop::lockstep_board::InProcessBoard;

@@ -15,7 +15,7 @@ use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::replay::replay;
 use clutch_loop::to_log::PRESENT_CODE;
 use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions, VirtualReport};
-use clutch_node::lockstep::Exchange;
+use clutch_node::controller_lockstep::Exchange;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use clutch_tests::command;

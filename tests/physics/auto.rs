@@ -153,7 +153,7 @@ fn figures_of_random_scenarios_are_what_the_pair_at_a_tight_tolerance_says() {
         exact += u32::from(runs[0].engine == EngineKind::ExactFlow);
         sticks += u32::from(!runs[0].events.is_empty());
         assert_eq!(runs[0].events.len(), runs[1].events.len(), "{n}");
-        // What errors cancel in has their size, and not its own.
+        // A sum in which errors cancel has their size, and not its own.
         let size = |name| if name == "mean_error_rad" { runs[0].metrics.max_error_rad } else { 1e-9 };
         let share = |name, a: f64, b: f64| (a - b).abs() / a.abs().max(b.abs()).max(size(name)).max(1e-9);
         // The start moved by some roundings: where that is seen, the run is a coin on its edge, and no engine is right.

@@ -509,6 +509,12 @@ fn what_is_wrong_goes_before_what_is_missing() {
         ("rig.encoder.counts_per_rev", "2.5", "expected a whole number from 4 to 16 777 216 counts"),
         ("run.seed", "-1", "a whole number from 0 to 9223372036854775807"),
         ("safety.limits.stand_still_counts", "3", "unknown key: it is gone, leave it out"),
+        ("rig.backlash_deg", "0.5", "unknown key: it asks for backlash; joints here are always in mesh"),
+        (
+            "rig.drive.weight.impact_nms",
+            "1.0",
+            "unknown key: it asks for impacts; velocities here do not jump",
+        ),
         ("model.mu_static", "0.2", "did you mean model.friction.stribeck.mu_static?"),
         ("law.pid.kp_v_rad", "3", "to choose another, set it as a whole: law={"),
     ] {
@@ -517,7 +523,7 @@ fn what_is_wrong_goes_before_what_is_missing() {
     }
 }
 
-/// What cannot work: the rig, what it is told to have, and words of the advice.
+/// A case that cannot work: the rig, what it is told to have, and words of the advice.
 #[test]
 fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
     let reason = |name: &str, set: &[(&str, &str)]| {

@@ -69,7 +69,7 @@ const ABLATIONS: &[Ablation] = &[
     ),
     Ablation(
         "board's periods against the host's clock",
-        "crates/clutch-node/src/pace.rs",
+        "crates/clutch-node/src/board_pace.rs",
         "self.off.get_or_insert(off);",
         "if !OFF { self.off.get_or_insert(off); }",
     ),

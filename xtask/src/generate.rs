@@ -3,7 +3,7 @@
 use crate::run::{cargo, root};
 use anyhow::{Context, Result, bail};
 
-/// What an example of a package prints, and the file that has it.
+/// The print of a package's example, and the file that has it.
 struct Printed {
     package: &'static str,
     example: &'static str,

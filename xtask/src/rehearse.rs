@@ -24,7 +24,7 @@ const ADDITIONS: &[Addition] = &[
     Addition { kind: "a metric", of: "mean of the error's magnitude", patch: "metric" },
 ];
 
-/// What tests hold as a list of their own: runs of each law for the comparison of bits, a hash, a record of a test.
+/// Lists that tests have of their own: runs of each law for the comparison of bits, a hash, a record of a test.
 const TESTS: &str = "tests";
 
 /// Tests of pages that show the output of commands, or the bits of all runs: a person puts a new figure there.

@@ -253,8 +253,8 @@ fn motor_values(s: &Setup, motor: &Motor) -> Result<(), Refused> {
     if s.converter_step > 1.0 {
         return refuse("converter_step", s.converter_step.to_string(), "at most 1 V with a motor");
     }
-    if matches!(s.law, Gains::Smc { .. }) {
-        return refuse("law", format!("{:?}", s.law), "PD, PID or a shell with a motor");
+    if matches!(s.law, Gains::Layer { .. }) {
+        return refuse("law", format!("{:?}", s.law), "linear, integral or a shell with a motor");
     }
     let off = at(0.5) * at(s.converter_step) + at(shaft::LAW_ROUNDING);
     let lowest = (at(s.volts[0]) - off).min(at(s.start_volts[0]));
@@ -272,14 +272,14 @@ fn motor_values(s: &Setup, motor: &Motor) -> Result<(), Refused> {
 fn sound(law: &Gains) -> bool {
     // Gains, what has to be above 0, and voltages.
     let (gains, above_0, volts) = match *law {
-        Gains::Pd { kp, kd, forward } => ([kp, 0.0, kd], 1.0, [forward; 3]),
-        Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
+        Gains::Linear { kp, kd, forward } => ([kp, 0.0, kd], 1.0, [forward; 3]),
+        Gains::Integral { kp, ki, kd, forward, tracking, limits } => {
             ([kp, ki, kd], tracking, [forward, limits[0], limits[1]])
         }
-        Gains::Smc { kp, kd, slope, boundary } => ([kp, kd, slope], boundary, [0.0; 3]),
+        Gains::Layer { kp, kd, slope, boundary } => ([kp, kd, slope], boundary, [0.0; 3]),
         Gains::Shell { slope, boundary } => ([slope, 0.0, 0.0], boundary, [0.0; 3]),
     };
-    let ordered = !matches!(law, Gains::Pid { limits, .. } if limits[0] > limits[1]);
+    let ordered = !matches!(law, Gains::Integral { limits, .. } if limits[0] > limits[1]);
     gains.iter().all(|g| *g >= 0.0 && g.is_finite())
         && above_0 > 0.0
         && above_0.is_finite()
@@ -448,7 +448,7 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
         // stands in the integral.
         let ways = 3 + setup.delay_ticks as usize;
         let (mut of_m0, mut rest) = (cz + cm, cs * rate - cm * path);
-        if let Gains::Pid { kp, ki, forward, .. } = setup.law {
+        if let Gains::Integral { kp, ki, forward, .. } = setup.law {
             let off = Interval { low: -shaft::LAW_ROUNDING, high: shaft::LAW_ROUNDING };
             of_m0 = of_m0 + at(row[ways]) * (at(kp) + at(ki) * at(setup.period_s)) * shaft.count;
             rest = rest + at(row[ways]) * (volts + off - shaft.counted(forward));

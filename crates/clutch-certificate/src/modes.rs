@@ -277,8 +277,8 @@ mod tests {
     #[test]
     fn a_simulated_tick_goes_no_further_than_its_mode_allows() {
         let laws = [
-            Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 },
-            Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
+            Gains::Linear { kp: 5000.0, kd: 50.0, forward: 0.0 },
+            Gains::Layer { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
             Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];
         let mut next = uniform(11);
@@ -300,7 +300,7 @@ mod tests {
         let mut next = uniform(12);
         let mut seen = [0; 4];
         let laws =
-            [Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.6 }, Gains::Shell { slope: 50.0, boundary: 0.2 }];
+            [Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.6 }, Gains::Shell { slope: 50.0, boundary: 0.2 }];
         for (law, form) in laws.into_iter().flat_map(|law| [(law, Form::Noise), (law, Form::Exact)]) {
             for corner in 0..4 {
                 ticks::<4>(&motor(law, corner), form, &mut next, &mut seen);

@@ -60,11 +60,11 @@ fn error(u: &Units) -> Line {
 /// All pieces of the law.
 pub(crate) fn pieces(u: &Units, strips: &[Strip]) -> Vec<Piece> {
     match u.law {
-        Gains::Pd { kp, kd, forward } => {
+        Gains::Linear { kp, kd, forward } => {
             linear(u, Line::constant(forward).plus(error(u), -kp).plus(rate(u), -kd))
         }
-        Gains::Pid { .. } => pid(u),
-        Gains::Smc { slope, .. } => smc(u, slope, strips),
+        Gains::Integral { .. } => integral(u),
+        Gains::Layer { slope, .. } => layer(u, slope, strips),
         Gains::Shell { slope, boundary } => shell(u, slope, boundary),
     }
 }
@@ -94,8 +94,8 @@ fn linear(u: &Units, demand: Line) -> Vec<Piece> {
 }
 
 /// [`linear`], with what the integral makes of each: it goes on, or ends at what the output can answer.
-fn pid(u: &Units) -> Vec<Piece> {
-    let Gains::Pid { kp, ki, kd, forward, tracking, limits } = u.law else { return Vec::new() };
+fn integral(u: &Units) -> Vec<Piece> {
+    let Gains::Integral { kp, ki, kd, forward, tracking, limits } = u.law else { return Vec::new() };
     let integral = Line { memory: 1.0, ..Line::default() }.plus(error(u), -ki * u.period);
     let demand = integral.plus(Line::constant(forward), 1.0).plus(error(u), -kp).plus(rate(u), -kd);
     let share = u.period / tracking;
@@ -144,7 +144,7 @@ fn shell(u: &Units, slope: f64, boundary: f64) -> Vec<Piece> {
     ]
 }
 
-fn smc(u: &Units, slope: f64, strips: &[Strip]) -> Vec<Piece> {
+fn layer(u: &Units, slope: f64, strips: &[Strip]) -> Vec<Piece> {
     let d = rate(u);
     let sigma = error(u).times(slope).plus(d, 1.0);
     let one = Line::constant(1.0);
@@ -175,9 +175,9 @@ fn ahead((kp, kd, boundary): (f64, f64, f64), s: f64, d: f64) -> f64 {
     kp * (s / boundary).min(1.0) + kd * (s * d * d / boundary).min(d)
 }
 
-/// Strips for (31), none for PD; `limits` of the voltage.
+/// Strips for (31), none for a linear law; `limits` of the voltage.
 pub(crate) fn strips(law: &Gains, [low, high]: [f64; 2]) -> Vec<Strip> {
-    let Gains::Smc { kp, kd, boundary, .. } = *law else { return Vec::new() };
+    let Gains::Layer { kp, kd, boundary, .. } = *law else { return Vec::new() };
     let knee = if kd > 0.0 { libm::sqrt(kp / kd).min(1e3) } else { 1e3 };
     let law = (kp, kd, boundary);
     let mut out = Vec::new();
@@ -245,11 +245,11 @@ pub(crate) mod tests {
         let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
         let sat = |x: f64| x.clamp(-1.0, 1.0);
         let demand = match u.law {
-            Gains::Pd { kp, kd, forward } => forward - (kp * e + kd * d),
-            Gains::Pid { kp, ki, kd, forward, .. } => {
+            Gains::Linear { kp, kd, forward } => forward - (kp * e + kd * d),
+            Gains::Integral { kp, ki, kd, forward, .. } => {
                 forward + integral - (kp * e + ki * u.period * e + kd * d)
             }
-            Gains::Smc { kp, kd, slope, boundary } => {
+            Gains::Layer { kp, kd, slope, boundary } => {
                 let sigma = slope * e + d;
                 -(kp * sat(sigma / boundary) + kd * sat(sigma * d / boundary) * d)
             }
@@ -265,7 +265,7 @@ pub(crate) mod tests {
 
     /// The next integral, as the law computes it.
     pub(crate) fn remembered(u: &Units, m: f64, z: f64, integral: f64) -> f64 {
-        let Gains::Pid { kp, ki, kd, forward, tracking, limits } = u.law else { return 0.0 };
+        let Gains::Integral { kp, ki, kd, forward, tracking, limits } = u.law else { return 0.0 };
         let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
         let gained = integral - ki * u.period * e;
         let demand = forward + gained - kp * e - kd * d;
@@ -273,9 +273,9 @@ pub(crate) mod tests {
         (gained + u.period / tracking * cut_off).clamp(limits[0] - forward, limits[1] - forward)
     }
 
-    /// PID, with limits of the output a step beyond the converter's.
+    /// A law with an integral, with limits of the output a step beyond the converter's.
     pub(crate) fn with_an_integral(tracking: f64, forward: f64) -> Gains {
-        Gains::Pid { kp: 1250.0, ki: 10_000.0, kd: 12.9, forward, tracking, limits: [0.0, 10.0] }
+        Gains::Integral { kp: 1250.0, ki: 10_000.0, kd: 12.9, forward, tracking, limits: [0.0, 10.0] }
     }
 
     #[test]
@@ -283,13 +283,13 @@ pub(crate) mod tests {
         let laws = [
             with_an_integral(0.05, 0.0),
             with_an_integral(0.002, 2.2),
-            Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 },
-            Gains::Pd { kp: 1660.0, kd: 12.9, forward: 2.24 },
-            Gains::Pd { kp: 1660.0, kd: 12.9, forward: -1.5 },
-            Gains::Smc { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 },
-            Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
-            Gains::Smc { kp: 12.0, kd: 3.0, slope: 50.0, boundary: 0.3 },
-            Gains::Smc { kp: 2.0, kd: 0.0, slope: 50.0, boundary: 0.3 },
+            Gains::Linear { kp: 5000.0, kd: 50.0, forward: 0.0 },
+            Gains::Linear { kp: 1660.0, kd: 12.9, forward: 2.24 },
+            Gains::Linear { kp: 1660.0, kd: 12.9, forward: -1.5 },
+            Gains::Layer { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 },
+            Gains::Layer { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
+            Gains::Layer { kp: 12.0, kd: 3.0, slope: 50.0, boundary: 0.3 },
+            Gains::Layer { kp: 2.0, kd: 0.0, slope: 50.0, boundary: 0.3 },
             Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];
         for law in laws {

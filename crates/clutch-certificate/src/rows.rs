@@ -27,8 +27,10 @@ pub(crate) struct Fineness {
 /// The law near its steady voltage: volts per count, and per count per tick.
 fn linear(u: &Units) -> (f64, f64) {
     match u.law {
-        Gains::Pd { kp, kd, .. } | Gains::Pid { kp, kd, .. } => (kp * u.count, kd * u.speed),
-        Gains::Smc { kp, slope, boundary, .. } => (kp * slope / boundary * u.count, kp / boundary * u.speed),
+        Gains::Linear { kp, kd, .. } | Gains::Integral { kp, kd, .. } => (kp * u.count, kd * u.speed),
+        Gains::Layer { kp, slope, boundary, .. } => {
+            (kp * slope / boundary * u.count, kp / boundary * u.speed)
+        }
         // As if it went in a straight line from one end to the other.
         Gains::Shell { slope, boundary } => {
             let per = (u.volts[1] - u.volts[0]) / (2.0 * boundary);
@@ -40,7 +42,7 @@ fn linear(u: &Units) -> (f64, f64) {
 /// The integral: volts that it gains per count in a tick, and share of what a limit cuts off that it takes back.
 fn integral(u: &Units) -> (f64, f64) {
     match u.law {
-        Gains::Pid { ki, tracking, .. } => (ki * u.period * u.count, u.period / tracking),
+        Gains::Integral { ki, tracking, .. } => (ki * u.period * u.count, u.period / tracking),
         _ => (0.0, 0.0),
     }
 }
@@ -122,8 +124,8 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     }
     // Shares of the gains that a saturated loop, or a steeper part of the law, leaves.
     let mut shares: Vec<f64> = match (u.law, form) {
-        (Gains::Smc { .. }, _) if fineness.saturated => vec![1.0, 2.0, 0.5, 0.25],
-        (Gains::Smc { .. }, _) => vec![1.0, 2.0, 4.0, 0.5],
+        (Gains::Layer { .. }, _) if fineness.saturated => vec![1.0, 2.0, 0.5, 0.25],
+        (Gains::Layer { .. }, _) => vec![1.0, 2.0, 4.0, 0.5],
         (_, Form::Noise) => vec![1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
         (_, Form::Exact) => vec![1.0, 0.7, 0.5, 0.35, 0.25],
     };
@@ -132,7 +134,7 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     }
     // In a saturated loop the slope of (31) by the error and that by the rate are not left alike.
     let of_rate: &[f64] = match u.law {
-        Gains::Smc { .. } if fineness.saturated => &[0.0, 0.25, 0.5, 1.0],
+        Gains::Layer { .. } if fineness.saturated => &[0.0, 0.25, 0.5, 1.0],
         _ => &[1.0],
     };
     let middle = (u.brake[0] * u.brake[1]).sqrt();

@@ -165,11 +165,11 @@ fn second(setup: &Setup, bound: f64) -> Option<(Form, (Fineness, f64))> {
         None => setup.drive_torque[1] / (setup.sliding[0] * setup.brake_gain[0]),
     };
     let (attempt, steady) = match u.law {
-        Gains::Pd { kp, forward, .. } => ((Form::Exact, SATURATED), (holds - forward).abs() / kp),
-        Gains::Smc { kp, slope, boundary, .. } => {
+        Gains::Linear { kp, forward, .. } => ((Form::Exact, SATURATED), (holds - forward).abs() / kp),
+        Gains::Layer { kp, slope, boundary, .. } => {
             ((Form::Noise, SATURATED_SMC), holds * boundary / (kp * slope))
         }
-        Gains::Pid { .. } | Gains::Shell { .. } => return None,
+        Gains::Integral { .. } | Gains::Shell { .. } => return None,
     };
     (bound > steady + USUAL_COUNTS * count).then_some(attempt)
 }
@@ -179,11 +179,11 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     let (first, later): (&[_], &[_]) = match setup.law {
         Gains::Shell { .. } if !options.patient => (&[(Form::Exact, COARSE)], &[]),
         Gains::Shell { .. } => (&[(Form::Exact, COARSE), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
-        Gains::Pid { .. } if !options.patient => (&[(Form::Noise, LONG)], &[(Form::Exact, USUAL)]),
-        Gains::Pid { .. } => (&[(Form::Noise, SLOW), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
-        Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
+        Gains::Integral { .. } if !options.patient => (&[(Form::Noise, LONG)], &[(Form::Exact, USUAL)]),
+        Gains::Integral { .. } => (&[(Form::Noise, SLOW), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
+        Gains::Linear { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         // (31) has hundreds of modes, times the counts of the exact form.
-        Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
+        Gains::Layer { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
     };
     let slow = setup.slow_exponents();
     let quick = slow[0];
@@ -248,7 +248,7 @@ fn attempt(parts: &Parts<'_>) -> Result<Cell, Open> {
     })
 }
 
-/// What an attempt is made of: a part of the box, an end of slow speeds, and form and fineness of the set.
+/// The ingredients of an attempt: a part of the box, an end of slow speeds, and form and fineness of the set.
 struct Parts<'a> {
     setup: &'a Setup,
     sliding: Ends,
@@ -273,7 +273,7 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
                     for p in &mut x[P..P + u.delay] {
                         *p = volts;
                     }
-                    if let (Some(i), Gains::Pid { kp, ki, forward, .. }) = (u.memory(), u.law) {
+                    if let (Some(i), Gains::Integral { kp, ki, forward, .. }) = (u.memory(), u.law) {
                         // A start without a jump: the first demand is the voltage that the brake has.
                         x[i] = volts + off - forward + (kp + ki * u.period) * u.count * (e + rounding);
                     }
@@ -290,8 +290,8 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
 /// Error beyond which a set is no more looked for, counts: several times the steady one and what a few counts make.
 fn hopeless(u: &Units) -> f64 {
     let volts_per_count = match u.law {
-        Gains::Pd { kp, .. } | Gains::Pid { kp, .. } => kp * u.count,
-        Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
+        Gains::Linear { kp, .. } | Gains::Integral { kp, .. } => kp * u.count,
+        Gains::Layer { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
         // A law within a shell takes a wider set for its worst.
         Gains::Shell { slope, boundary } => u.volts[1] * slope / (6.0 * boundary) * u.count,
     };
@@ -312,11 +312,11 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
     // A set of a slow loop grows and shrinks by as little per tick as the loop does.
     let (sweeps, shrinks, settled, work) = match p.setup.law {
-        Gains::Pid { .. } => (1500, 400, 1e-5, 6 * p.options.work),
+        Gains::Integral { .. } => (1500, 400, 1e-5, 6 * p.options.work),
         Gains::Shell { .. } => (600, 40, 1e-4, p.options.work),
         // Four times the directions, and hundreds of modes.
-        Gains::Smc { .. } if p.fineness.saturated => (300, 40, 1e-4, 8 * p.options.work),
-        Gains::Pd { .. } | Gains::Smc { .. } => (300, 40, 1e-4, p.options.work),
+        Gains::Layer { .. } if p.fineness.saturated => (300, 40, 1e-4, 8 * p.options.work),
+        Gains::Linear { .. } | Gains::Layer { .. } => (300, 40, 1e-4, p.options.work),
     };
     let effort = Effort {
         growth: p.growth,

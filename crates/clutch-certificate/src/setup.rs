@@ -79,7 +79,7 @@ impl Gains {
     /// `true` if the law remembers an integral.
     #[must_use]
     pub fn remembers(&self) -> bool {
-        matches!(self, Gains::Pid { .. })
+        matches!(self, Gains::Integral { .. })
     }
 }
 
@@ -158,12 +158,12 @@ impl Setup {
     }
 }
 
-/// Laws that have a sampled certificate, with their gains.
+/// Forms of a law in the sampled loop that have a certificate, with their gains.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Gains {
     /// (4), with a voltage beside it: `u = u_f − (K_p e + K_d ė)`; of a motor `u_f + (…)`, here and below.
-    Pd {
+    Linear {
         /// `K_p`, V/rad.
         kp: f64,
         /// `K_d`, V s/rad.
@@ -172,9 +172,9 @@ pub enum Gains {
         #[serde(default)]
         forward: f64,
     },
-    /// PD with an integral `I` of the error, in volts: `u = u_f + I − (K_p e + K_d ė)`. It takes back the part that a limit cuts off, and
+    /// The same with an integral `I` of the error, in volts: `u = u_f + I − (K_p e + K_d ė)`. It takes back the part that a limit cuts off, and
     /// it stays within what the output can answer.
-    Pid {
+    Integral {
         /// `K_p`, V/rad.
         kp: f64,
         /// `K_i`, V/(rad s).
@@ -189,7 +189,7 @@ pub enum Gains {
         limits: Ends,
     },
     /// (31).
-    Smc {
+    Layer {
         /// `K_p`, V.
         kp: f64,
         /// `K_d`, V s/rad.
@@ -257,8 +257,8 @@ pub enum Case {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModeId {
-    /// Number of the law's piece: 0 lets go; of PD 1 is straight and 2 full, of a shell 1 is any and 2 full; of SMC 1 is
-    /// the first strip. Of PID 0 to 2 are those of PD, 3 to 5 the same with the integral at its lower end, 6 to 8 at its upper.
+    /// Number of the law's piece: 0 lets go; of a linear law 1 is straight and 2 full, of a shell 1 is any and 2 full; of a layer 1 is
+    /// the first strip. Of an integral 0 to 2 are those of a linear law, 3 to 5 the same with the integral at its lower end, 6 to 8 at its upper.
     pub piece: u32,
     /// The shaft.
     pub case: Case,
@@ -302,11 +302,11 @@ pub struct Cell {
     /// Exponent of Stribeck's curve, (2), at which its slow speeds end: what is left of it there, `e` to the power of minus this,
     /// counts as friction at every speed.
     pub slow_exponent: f64,
-    /// Pieces of (31) ahead of its surface; none of PD.
+    /// Pieces of (31) ahead of its surface; none of a linear law.
     pub strips: Vec<Strip>,
     /// Modes, in the order of their numbers.
     pub modes: Vec<ModeId>,
-    /// Rows `c` of the set `c·x ≤ r`, of the state `(e, ė, z, p₁ … p_d, I, m₋)` in counts, ticks and volts; `I` of PID only.
+    /// Rows `c` of the set `c·x ≤ r`, of the state `(e, ė, z, p₁ … p_d, I, m₋)` in counts, ticks and volts; `I` of an integral only.
     /// A motor's volts are counted down from [`Setup::counted_from`], and its integral has the other sign.
     pub rows: Vec<Vec<f64>>,
     /// Radii `r`.
@@ -332,4 +332,4 @@ pub struct Certificate {
 }
 
 /// Version of the format that this crate writes and reads.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;

@@ -163,9 +163,9 @@ impl Units {
             |torque: f64, [positive, negative]: Ends| torque / if torque > 0.0 { positive } else { negative };
         let lets_go = any[1] + s.viscous_damping[1] * slow - torque[0];
         let law = match self.law {
-            Gains::Pd { kp, kd, forward } => Gains::Pd { kp, kd, forward: from - forward },
-            Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
-                Gains::Pid { kp, ki, kd, forward: from - forward, tracking, limits: down(limits) }
+            Gains::Linear { kp, kd, forward } => Gains::Linear { kp, kd, forward: from - forward },
+            Gains::Integral { kp, ki, kd, forward, tracking, limits } => {
+                Gains::Integral { kp, ki, kd, forward: from - forward, tracking, limits: down(limits) }
             }
             other => other,
         };

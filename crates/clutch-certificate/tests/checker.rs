@@ -13,7 +13,7 @@ fn setup(law: Gains, smoothing: f64, delay_ticks: u32, rate_deg_s: f64) -> Setup
 }
 
 fn paper_pd() -> Setup {
-    setup(Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 }, 0.2, 0, 2.0)
+    setup(Gains::Linear { kp: 5000.0, kd: 50.0, forward: 0.0 }, 0.2, 0, 2.0)
 }
 
 fn found(setup: &Setup) -> Certificate {
@@ -35,7 +35,7 @@ fn degrees(certificate: &Certificate) -> f64 {
 #[test]
 fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
     // Seen in 200 runs each: docs/certified.md.
-    let pd = |kp, kd, kappa, delay, rate| setup(Gains::Pd { kp, kd, forward: 0.0 }, kappa, delay, rate);
+    let pd = |kp, kd, kappa, delay, rate| setup(Gains::Linear { kp, kd, forward: 0.0 }, kappa, delay, rate);
     for (setup, seen) in [(pd(5000.0, 50.0, 1.0, 0, 2.0), 0.0518), (pd(1660.0, 12.9, 0.712, 1, 20.0), 0.1006)]
     {
         let bound = degrees(&found(&setup));
@@ -43,7 +43,7 @@ fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
     }
     let bound = degrees(&good());
     assert!((0.0513..0.1).contains(&bound), "{bound}°");
-    let smc = Gains::Smc { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 };
+    let smc = Gains::Layer { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 };
     let bound = degrees(&found(&setup(smc, 0.2, 0, 2.0)));
     assert!((0.0784..0.2).contains(&bound), "{bound}°");
 }
@@ -51,7 +51,7 @@ fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
 #[test]
 fn a_loop_that_goes_from_limit_to_limit_with_each_count_has_a_bound_of_a_few_counts() {
     // 16 V per count in a period. Without directions of a saturated loop it is 0.21°; a box that is wider has 0.0624° in runs.
-    let loud = setup(Gains::Pd { kp: 10_000.0, kd: 50.0, forward: 0.0 }, 1.0, 0, 20.0);
+    let loud = setup(Gains::Linear { kp: 10_000.0, kd: 50.0, forward: 0.0 }, 1.0, 0, 20.0);
     let loud = Setup { sliding: [0.1375, 0.1583], at_rest: [0.12, 0.28], ..loud };
     // One cell is enough.
     let one = Options { refinements: 0, ..Options::default() };
@@ -61,7 +61,7 @@ fn a_loop_that_goes_from_limit_to_limit_with_each_count_has_a_bound_of_a_few_cou
 
 #[test]
 fn a_voltage_that_holds_the_shaft_beside_the_gains_takes_the_offset_from_the_bound() {
-    let pd = |forward| setup(Gains::Pd { kp: 1660.0, kd: 12.9, forward }, 0.712, 1, 2.0);
+    let pd = |forward| setup(Gains::Linear { kp: 1660.0, kd: 12.9, forward }, 0.712, 1, 2.0);
     // T_u/(μ_d K), without which the error alone has to ask for it.
     let holds: f64 = 0.047_088 / (0.15 * 0.14);
     let offset = (holds / 1660.0).to_degrees();
@@ -72,7 +72,8 @@ fn a_voltage_that_holds_the_shaft_beside_the_gains_takes_the_offset_from_the_bou
 /// PI of the paper's shaft, looked for once.
 fn integral() -> Certificate {
     static FOUND: OnceLock<Certificate> = OnceLock::new();
-    let law = Gains::Pid { kp: 1250.0, ki: 1e4, kd: 12.9, forward: 0.0, tracking: 0.05, limits: [0.0, 10.0] };
+    let law =
+        Gains::Integral { kp: 1250.0, ki: 1e4, kd: 12.9, forward: 0.0, tracking: 0.05, limits: [0.0, 10.0] };
     let options = Options { patient: false, ..Options::default() };
     FOUND.get_or_init(|| search(&setup(law, 0.4, 0, 20.0), &options, false).certificate).clone()
 }
@@ -80,22 +81,22 @@ fn integral() -> Certificate {
 #[test]
 fn an_integral_leaves_no_offset_and_a_bound_well_below_that_of_its_gains_without() {
     let with = degrees(&integral());
-    let without = degrees(&found(&setup(Gains::Pd { kp: 1250.0, kd: 12.9, forward: 0.0 }, 0.4, 0, 20.0)));
+    let without = degrees(&found(&setup(Gains::Linear { kp: 1250.0, kd: 12.9, forward: 0.0 }, 0.4, 0, 20.0)));
     assert!((0.013..0.065).contains(&with) && without > 2.0 * with, "{with}° with, {without}° without");
 }
 
 #[test]
 fn another_integral_is_refused() {
     let good = integral();
-    let Gains::Pid { kp, ki, kd, forward, tracking, limits } = good.setup.law else { panic!() };
-    let law = |kp, ki, forward, tracking, limits| Gains::Pid { kp, ki, kd, forward, tracking, limits };
+    let Gains::Integral { kp, ki, kd, forward, tracking, limits } = good.setup.law else { panic!() };
+    let law = |kp, ki, forward, tracking, limits| Gains::Integral { kp, ki, kd, forward, tracking, limits };
     for other in [
         law(1.02 * kp, ki, forward, tracking, limits),
         law(kp, 1.05 * ki, forward, tracking, limits),
         law(kp, ki, 0.1, tracking, limits),
         law(kp, ki, forward, 0.5 * tracking, limits),
         law(kp, ki, forward, tracking, [0.0, 9.0]),
-        Gains::Pd { kp, kd, forward },
+        Gains::Linear { kp, kd, forward },
     ] {
         let mut bad = good.clone();
         bad.setup.law = other;
@@ -200,9 +201,9 @@ fn another_gain_period_brake_path_or_delay_is_refused() {
         assert!(!bad.setup.differences(&good.setup).is_empty());
         assert!(check(&bad).is_err(), "{:?}", bad.setup.differences(&good.setup));
     };
-    change(&|s| s.law = Gains::Pd { kp: 5050.0, kd: 50.0, forward: 0.0 });
-    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 49.0, forward: 0.0 });
-    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.05 });
+    change(&|s| s.law = Gains::Linear { kp: 5050.0, kd: 50.0, forward: 0.0 });
+    change(&|s| s.law = Gains::Linear { kp: 5000.0, kd: 49.0, forward: 0.0 });
+    change(&|s| s.law = Gains::Linear { kp: 5000.0, kd: 50.0, forward: 0.05 });
     change(&|s| s.period_s = 0.00101);
     change(&|s| s.inertia = [0.0016, 0.0017]);
     change(&|s| s.drive_torque[1] *= 1.02);
@@ -223,7 +224,7 @@ fn another_gain_period_brake_path_or_delay_is_refused() {
 
 #[test]
 fn a_strip_of_smc_moved_or_missing_is_refused() {
-    let smc = Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 };
+    let smc = Gains::Layer { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 };
     let good = found(&setup(smc, 0.5, 0, 2.0));
     let strips = good.cells[0].strips.len();
     for k in (0..strips).step_by(11) {
@@ -281,9 +282,9 @@ fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
     };
     refused("", "EOF");
     refused(&text[..text.len() / 2], "EOF");
-    refused(&text.replacen("\"version\":2", "\"version\":1", 1), "version is 1: expected 2");
+    refused(&text.replacen("\"version\":3", "\"version\":2", 1), "version is 2: expected 3");
     // Any other content that the version may have.
-    refused("{\"version\":1,\"proof\":[]}", "version is 1: expected 2");
+    refused("{\"version\":2,\"proof\":[]}", "version is 2: expected 3");
     refused(&text.replacen("\"inertia\"", "\"inertai\"", 1), "inertai");
     refused(&text.replacen("\"kp\":5000.0", "\"kp\":\"much\"", 1), "f64");
     assert!(file::read(&folder.join("none.json")).unwrap_err().to_string().contains("none.json"));
@@ -334,7 +335,7 @@ fn a_noise_that_turns_the_drive_round_is_refused_whatever_the_proofs_say() {
 
 #[test]
 fn a_start_with_more_volts_than_the_set_holds_is_refused() {
-    let proven = found(&setup(Gains::Pd { kp: 1660.0, kd: 12.9, forward: 0.0 }, 0.712, 1, 2.0));
+    let proven = found(&setup(Gains::Linear { kp: 1660.0, kd: 12.9, forward: 0.0 }, 0.712, 1, 2.0));
     let mut higher = proven.clone();
     higher.setup.start_volts[1] = 2.0 * higher.setup.volts[1];
     assert!(check(&proven).is_ok() && check(&higher).is_err());
@@ -360,7 +361,7 @@ fn motor(law: Gains) -> Setup {
 
 #[test]
 fn a_motor_axis_has_a_bound_of_a_few_counts_and_each_change_of_it_is_refused() {
-    let pd = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.6 };
+    let pd = Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.6 };
     let setup = motor(pd);
     let one = Options { refinements: 0, widest: 1.1, ..Options::default() };
     let good = search(&setup, &one, false);
@@ -390,9 +391,9 @@ fn a_motor_axis_has_a_bound_of_a_few_counts_and_each_change_of_it_is_refused() {
     change(&|s| s.at_rest[1] = 0.25);
     change(&|s| s.ripple = 0.02);
     change(&|s| s.volts[1] = 6.0);
-    change(&|s| s.law = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.65 });
-    change(&|s| s.law = Gains::Pd { kp: 500.0, kd: 8.0, forward: 0.55 });
-    change(&|s| s.law = Gains::Pd { kp: 480.0, kd: 8.0, forward: 0.6 });
+    change(&|s| s.law = Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.65 });
+    change(&|s| s.law = Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.55 });
+    change(&|s| s.law = Gains::Linear { kp: 480.0, kd: 8.0, forward: 0.6 });
     change(&|s| s.delay_ticks = 1);
 }
 
@@ -416,7 +417,7 @@ fn a_motor_that_may_turn_its_shaft_round_is_refused_whatever_the_proofs_say() {
     );
     assert!(told(&|s| s.torque_noise = 0.02).contains("setup.volts"));
     assert!(
-        told(&|s| s.law = Gains::Smc { kp: 1.0, kd: 1.0, slope: 50.0, boundary: 0.2 })
+        told(&|s| s.law = Gains::Layer { kp: 1.0, kd: 1.0, slope: 50.0, boundary: 0.2 })
             .contains("with a motor")
     );
     assert!(told(&|s| s.motor = Some(Motor { gain: [0.0, 0.05], preload: 0.25 })).contains("motor.gain"));

@@ -10,7 +10,7 @@ use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
-use clutch_loop::chip::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession};
+use clutch_loop::chip_board::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession};
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};

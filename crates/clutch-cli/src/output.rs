@@ -68,7 +68,7 @@ pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses files that cannot be written: before a long run, not after. What stands there is not touched.
+/// Refuses files that cannot be written: before a long run, not after. A file that stands there is not touched.
 pub(crate) fn check_files<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> anyhow::Result<()> {
     for file in files {
         let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -243,7 +243,7 @@ fn text(tuned: &Tuned) -> String {
         let (tried, unstable) = c.tried;
         let left_out =
             if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
-        // What holds for all of them is said once.
+        // A remark on all of them is made once.
         let why = match &c.standing {
             Standing::Uncertified { why } if Some(why) == tuned.uncovered.as_ref() => {
                 "uncertified".to_owned()

@@ -219,7 +219,7 @@ fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
         if (torque[1] - torque[0]) * model.drive_torque.abs() < NARROW * beside {
             torque = [1.0; 2];
         }
-        // What counts is each over the torque per volt.
+        // Each counts over the torque per volt.
         let over = |[low, high]: [f64; 2]| ends([low / gain[1], high / gain[0]]);
         let mut corners = Vec::new();
         for torque in over(torque) {

@@ -1,5 +1,8 @@
 //! The real-time loop over a serial line, and the simulated board.
 //!
+//! A file is named after the board or the host that it is about; without one of them in its name it is this machine's own part, as
+//! controller or as host of one.
+//!
 //! | file | is |
 //! |---|---|
 //! | `from_scenario`, `build_error` | from a checked scenario to a run that is built; why it cannot be |
@@ -14,12 +17,12 @@
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `onlooker`, `live_gains`, `tuning` | one that looks on while a run goes; gains that are changed meanwhile |
 //! | `virtual_time` | the same run with a computed clock |
-//! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
+//! | `sim_board`, `sim_board_server`, `sim_board_greeting` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
 //! | `healthy` | runs in which nothing breaks |
 //! | `lockstep_board`, `lockstep_host`, `lockstep_session` | a board controller that is asked instead of keeping time, its host, and a session with it |
 //! | `qemu_board` | such a board, emulated |
-//! | `chip` | a board's own image on a register model of its chip |
+//! | `chip_board` | a board's own image on a register model of its chip |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
 //! | `picture` | what of a log a picture shows |
 //!
@@ -31,7 +34,7 @@ mod board_words;
 pub mod build_error;
 pub mod campaign;
 #[cfg(target_os = "linux")]
-pub mod chip;
+pub mod chip_board;
 pub mod clearance;
 #[cfg(target_os = "linux")]
 pub mod control_loop;
@@ -39,8 +42,6 @@ pub mod drift;
 pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;
-#[cfg(target_os = "linux")]
-mod greeting;
 pub mod healthy;
 pub mod live_gains;
 pub mod lockstep_board;
@@ -63,6 +64,8 @@ pub mod replay;
 #[cfg(target_os = "linux")]
 pub mod session;
 pub mod sim_board;
+#[cfg(target_os = "linux")]
+mod sim_board_greeting;
 #[cfg(target_os = "linux")]
 pub mod sim_board_server;
 pub mod station;

@@ -1,6 +1,6 @@
 //! A board controller that is asked in lockstep, and one in this process.
 
-use clutch_node::lockstep::{Exchange, answer};
+use clutch_node::controller_lockstep::{Exchange, answer};
 use clutch_node::{BoardController, BoardControllerParams, Outboxes};
 
 /// A board that answers in lockstep.

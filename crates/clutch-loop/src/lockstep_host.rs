@@ -6,7 +6,7 @@ use crate::lockstep_board::LockstepBoard;
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE, Station, StationNotice};
 use clutch_core::law::LawTerms;
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned};
-use clutch_node::lockstep::Exchange;
+use clutch_node::controller_lockstep::Exchange;
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_settings::Settings;
 use clutch_sim::Scenario;

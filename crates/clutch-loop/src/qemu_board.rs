@@ -1,7 +1,7 @@
 //! The emulated board: a Cortex-M4F in `qemu-system-arm`, asked in lockstep.
 
 use crate::lockstep_board::LockstepBoard;
-use clutch_node::lockstep::{Exchange, LONGEST};
+use clutch_node::controller_lockstep::{Exchange, LONGEST};
 use clutch_wire::{BoardState, Decoder, Message, STATUS_STATE, Set, encode};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{CWD, FileType, Mode, mknodat};

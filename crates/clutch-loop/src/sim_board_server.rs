@@ -8,10 +8,10 @@
 
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
-use crate::greeting::Greeting;
 use crate::port::{ClientEvent, Endpoint};
 use crate::realtime::{WaitMode, monotonic_ns};
 use crate::sim_board::{SimBoard, SimBoardError};
+use crate::sim_board_greeting::Greeting;
 use clutch_node::Outbox;
 use clutch_sim::Scenario;
 use clutch_wire::BoardState;

@@ -4,7 +4,7 @@
 //! one second takes some milliseconds and repeats bit for bit.
 
 #[cfg(target_os = "linux")]
-use crate::chip::ChipError;
+use crate::chip_board::ChipError;
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
 use crate::onlooker::Played;

@@ -14,9 +14,9 @@
 
 use crate::board::misunderstood;
 use crate::controller::{ControllerNode, ControllerParams};
+use crate::controller_telemetry::{frame, states};
 use crate::notice::{Ending, Notice};
 use crate::outbox::{Outbox, Sink};
-use crate::telemetry::{frame, states};
 use clutch_core::law::LawTerms;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};

@@ -1,8 +1,8 @@
 //! The controller: handshake, cycle, stop. On a PC, and within [`crate::BoardController`].
 
+use crate::board_pace::BoardPace;
 use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
 use crate::outbox::Sink;
-use crate::pace::HostPace;
 use clutch_core::law::{ControlLaw, Law};
 use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
 use clutch_core::{
@@ -51,7 +51,7 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     silence_told: bool,
     lateness: Micros,
     stopping: Option<StopReason>,
-    pace: HostPace,
+    pace: BoardPace,
 }
 
 impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
@@ -71,7 +71,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             silence_told: false,
             lateness: Micros(0),
             stopping: None,
-            pace: HostPace::default(),
+            pace: BoardPace::default(),
         }
     }
 

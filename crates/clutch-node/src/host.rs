@@ -1,9 +1,9 @@
 //! The host of a board controller: it configures, consents, and hears.
 
+use crate::board_pace::BoardPace;
+use crate::controller_telemetry::{both_states, notice};
 use crate::notice::{Ending, LinkCounts, Notice, Standing};
 use crate::outbox::Outbox;
-use crate::pace::HostPace;
-use crate::telemetry::{both_states, notice};
 use clutch_core::law::LawTerms;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{FixedCounts, Micros, Planned, Servo, Target};
@@ -37,7 +37,7 @@ pub struct HostNode {
     stopped: bool,
     /// It has been silent for too long: a later report does not bring the run back.
     given_up: bool,
-    pace: HostPace,
+    pace: BoardPace,
 }
 
 impl HostNode {
@@ -63,7 +63,7 @@ impl HostNode {
             stopping: None,
             stopped: false,
             given_up: false,
-            pace: HostPace::default(),
+            pace: BoardPace::default(),
         }
     }
 

@@ -16,42 +16,44 @@
 //! and times go in, bytes and notices come out; the Linux loop, the simulated board, the tests in
 //! virtual time and firmware run the same two. No allocation, no `unsafe`, no reachable panic.
 //!
+//! A file is named after its node; without one in its name it is of all of them.
+//!
 //! | file | runs on | is |
 //! |---|---|---|
 //! | `controller` | PC or board | the node that closes the loop |
+//! | `controller_telemetry` | both | a run's cycles on their way to the host; on its way to the board it is [`Settings`](clutch_settings::Settings) |
+//! | `controller_lockstep` | both | a board controller that is asked instead of keeping time |
 //! | `board` | board | samples out, codes in, a watchdog |
-//! | `host` | PC | what sets a board controller up and looks on |
+//! | `board_program`, `board_counter` | board | what a board's program does each period, in either role; a counter of 16 bits as one of 32 |
+//! | `board_pace` | PC or board | the pace of a board's samples, by the clock of who gets them |
 //! | `board_controller` | board | a controller that a host looks at |
+//! | `host` | PC | what sets a board controller up and looks on |
 //! | `one_chip` | board | a board controller and its board in one memory |
-//! | `hardware` | board | what a board's program does each period, in either role |
-//! | `wide_counter` | board | a counter of 16 bits as one of 32 |
-//! | `lockstep` | both | a board controller that is asked instead of keeping time |
-//! | `telemetry` | both | a run's cycles on their way to the host; on its way to the board it is [`Settings`](clutch_settings::Settings) |
-//! | `notice`, `outbox`, `pace` | both | what a node reports, its frames on their way out, and the pace of the samples |
+//! | `notice`, `outbox` | both | what a node reports, and its frames on their way out |
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod board;
 mod board_controller;
+mod board_counter;
+mod board_pace;
+mod board_program;
 mod controller;
-mod hardware;
+pub mod controller_lockstep;
+mod controller_telemetry;
 mod host;
-pub mod lockstep;
 mod notice;
 mod one_chip;
 mod outbox;
-mod pace;
-mod telemetry;
-mod wide_counter;
 
 pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, present_code};
+pub use board_counter::WideCounter;
+pub use board_program::{DaqBoard, Hardware, Role, receive, tick};
 pub use clutch_wire::ResetCause;
 pub use controller::{ControllerNode, ControllerParams};
-pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
+pub use controller_lockstep::Outboxes;
 pub use host::HostNode;
-pub use lockstep::Outboxes;
 pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
 pub use one_chip::OneChip;
 pub use outbox::{Outbox, Sink};
-pub use wide_counter::WideCounter;

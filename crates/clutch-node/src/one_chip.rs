@@ -2,7 +2,7 @@
 
 use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::board_controller::{BoardController, BoardControllerParams};
-use crate::hardware::Role;
+use crate::board_program::Role;
 use crate::outbox::{Mail, Outbox, Sink};
 use clutch_core::{Counts, DacCode, Micros};
 use clutch_wire::{Actuate, BoardState, Message};

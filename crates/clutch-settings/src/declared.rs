@@ -329,7 +329,7 @@ impl Setting {
         };
         let within = self.name.used.checked_sub(2).and_then(|i| self.name.parts.get(i));
         match within.and_then(|key| Unit::of_key(key)) {
-            // What the wire carries is SI: the unit of a key that is converted is not the number's.
+            // The wire carries SI: the unit of a key that is converted is not the number's.
             Some(unit) if row.unit == NONE && unit.conversion == Conversion::None => *unit,
             _ => row.unit,
         }

@@ -32,6 +32,7 @@ pub mod smooth_speed;
 pub mod sweep;
 pub mod system;
 mod tables;
+mod unposed;
 
 pub use fleet::Fleet;
 pub use metrics::Metrics;

@@ -452,7 +452,7 @@ fn a_table_in_two_places_is_named_by_its_own() {
     Scenario::parse("two", &place.base.to_string(), &set).unwrap();
 }
 
-/// What relates keys names another one; these relate the value to no other.
+/// A relation of keys names another one; these relate the value to no other.
 const BY_ITSELF: &[&str] = &[
     "at least one point",
     "times of at least 0 s that rise from point to point",

@@ -27,7 +27,7 @@ use random_rig::motor::{Truth, truth};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// What an axis is tuned for: name, path, and time of the loop's run with its settling time, s.
+/// The task that an axis is tuned for: name, path, and time of the loop's run with its settling time, s.
 const PATHS: [(&str, &str, [f64; 2]); 3] = [
     ("a ramp at 2 °/s", "[reference.ramp]\nrate_deg_s = 2.0", [10.0, 1.0]),
     ("a ramp at 4 °/s", "[reference.ramp]\nrate_deg_s = 4.0", [10.0, 1.0]),

@@ -72,7 +72,7 @@ pub(crate) fn prove(
             narrowest: if shell { WIDE } else { Options::default().narrowest },
             error_limit: WORST,
             // Nor is patience worth its minute with an integral.
-            patient: !matches!(setup.law, Gains::Shell { .. } | Gains::Pid { .. }),
+            patient: !matches!(setup.law, Gains::Shell { .. } | Gains::Integral { .. }),
         };
         let found = search(setup, &options, false);
         if let Some(open) = found.open.first() {

@@ -3,7 +3,7 @@
 
 use crate::files::HostFile;
 use crate::last_word;
-use clutch_node::lockstep::{Exchange, LONGEST, answer};
+use clutch_node::controller_lockstep::{Exchange, LONGEST, answer};
 use clutch_node::{BoardController, Outboxes};
 use semihosting::process;
 

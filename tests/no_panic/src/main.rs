@@ -41,7 +41,7 @@ use clutch_core::{
     StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target, Tolerances,
     VelocityParams, VelocitySource, check_path, off_map, sin_cos_turns,
 };
-use clutch_node::lockstep::Exchange;
+use clutch_node::controller_lockstep::Exchange;
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
     DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter, present_code, receive, tick,

@@ -35,16 +35,16 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
     let off = shaft.volts_off;
     let let_go = [fixed((low - off).positive()), fixed(low + off)];
     match setup.law {
-        Gains::Pd { kp, kd, forward } => {
+        Gains::Linear { kp, kd, forward } => {
             if !cell.strips.is_empty() {
-                return Err("PD has none".into());
+                return Err("a linear law has none".into());
             }
             let demand = sum(&sum(&fixed(shaft.counted(forward)), at(-kp), &error), at(-kd), &rate);
             Ok(limited(&demand, [low, high], off))
         }
-        Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
+        Gains::Integral { kp, ki, kd, forward, tracking, limits } => {
             if !cell.strips.is_empty() {
-                return Err("PID has none".into());
+                return Err("a law with an integral has none".into());
             }
             let forward = shaft.counted(forward);
             let kept = [at(0.0), at(0.0), at(0.0), at(1.0)];
@@ -94,7 +94,7 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
                 Piece { id: 2, within: vec![sum(&least, at(1.0), &sigma)], volts: full, next: None },
             ])
         }
-        Gains::Smc { kp, kd, slope, boundary } => {
+        Gains::Layer { kp, kd, slope, boundary } => {
             complete(&cell.strips)?;
             let law = [kp, kd, boundary].map(at);
             let sigma = sum(&rate, at(slope), &error);

@@ -1,7 +1,7 @@
 //! The shaft of a cell in counts, ticks and volts, each bound on its safe side.
 
 use super::interval::{Interval, at};
-use crate::setup::{Cell, Setup};
+use crate::setup::{Cell, Motor, Setup};
 
 /// A step of the target may differ from the path's by one of its 2⁻¹⁶ counts.
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
@@ -89,18 +89,31 @@ impl Turned {
     }
 }
 
-impl Shaft {
-    pub(crate) fn new(s: &Setup, cell: &Cell) -> Shaft {
-        let tau =
-            Interval { low: core::f64::consts::TAU.next_down(), high: core::f64::consts::TAU.next_up() };
-        let count = tau / at(f64::from(s.counts_per_rev));
+/// Numbers that brakes and motors have in common, before either is asked.
+struct Common<'a> {
+    setup: &'a Setup,
+    cell: &'a Cell,
+    period: Interval,
+    speed: Interval,
+    /// rad/s² to counts per tick².
+    scale: Interval,
+    /// Least and most, kg m².
+    inertia: (Interval, Interval),
+    /// Weakest and strongest, N m.
+    drive: (Interval, Interval),
+    slow_si: Interval,
+    /// Least and most friction of a shaft that slides at any speed, and of one at rest.
+    sliding: (Interval, Interval),
+    rest: (Interval, Interval),
+    /// Least and most friction above Stribeck's speeds.
+    fast: (Interval, Interval),
+    volts_off: Interval,
+}
+
+impl<'a> Common<'a> {
+    fn new(s: &'a Setup, cell: &'a Cell, count: Interval) -> Self {
         let period = at(s.period_s);
-        let speed = count / period;
-        // rad/s² to counts per tick².
-        let scale = period * period / count;
-        let inertia = (at(s.inertia[0]), at(s.inertia[1]));
         let noise = at(s.torque_noise);
-        let (weakest_drive, strongest_drive) = (at(s.drive_torque[0]) - noise, at(s.drive_torque[1]) + noise);
 
         // Stribeck's speeds end at this exponent of the curve: any speed would do, as long as what is left is bounded there.
         let exponent = at(libm::pow(cell.slow_exponent, 1.0 / s.stribeck[1]));
@@ -112,14 +125,109 @@ impl Shaft {
         let least_rest =
             if s.rest_not_below_sliding { s.at_rest[0].max(cell.sliding[0]) } else { s.at_rest[0] };
         let rest = (at(least_rest), at(s.at_rest[1].max(least_rest)));
-        let least_fast = sliding.0 + left * (rest.0 - sliding.0).min(at(0.0));
-        let most_fast = sliding.1 + left * (rest.1 - sliding.0).positive();
+        Self {
+            setup: s,
+            cell,
+            period,
+            speed: count / period,
+            scale: period * period / count,
+            inertia: (at(s.inertia[0]), at(s.inertia[1])),
+            drive: (at(s.drive_torque[0]) - noise, at(s.drive_torque[1]) + noise),
+            slow_si,
+            sliding,
+            rest,
+            fast: (
+                sliding.0 + left * (rest.0 - sliding.0).min(at(0.0)),
+                sliding.1 + left * (rest.1 - sliding.0).positive(),
+            ),
+            volts_off: (at(0.5) * at(s.converter_step) + at(LAW_ROUNDING)).most(),
+        }
+    }
 
-        let volts_off = (at(0.5) * at(s.converter_step) + at(LAW_ROUNDING)).most();
-        let common = |shape: Shape| Shaft {
+    /// Drag of a shaft that has sped up all the tick.
+    fn drag(&self, most_drive: Interval) -> Interval {
+        at(self.setup.viscous_damping[1]) / self.inertia.0
+            * self.period
+            * (at(self.cell.speed_cap) + most_drive)
+    }
+
+    fn motor(&self, motor: &Motor) -> Shape {
+        let s = self.setup;
+        let ripple = Interval { low: 1.0 - s.ripple, high: 1.0 + s.ripple }.widened(LIBRARY);
+        let normal = ripple * at(motor.preload);
+        let friction =
+            |least: Interval, most: Interval| Interval { low: least.low, high: most.high } * normal;
+        let held = friction(self.rest.0.min(self.sliding.0), self.rest.1.max(self.sliding.1));
+        let from = at(s.counted_from());
+        let turn = Turned {
+            gain: Interval { low: motor.gain[0], high: motor.gain[1] },
+            torque: Interval { low: self.drive.0.low, high: self.drive.1.high },
+            per: self.scale / Interval { low: s.inertia[0], high: s.inertia[1] },
+            top: from,
+            range: (from - (at(s.volts[0]) - self.volts_off).min(at(s.start_volts[0]))).most(),
+        };
+        let ((least, most), brakes) = turn.lines(friction(self.fast.0, self.fast.1));
+        let ((least_anywhere, most_anywhere), brakes_anywhere) = turn.lines(held);
+        let drag = self.drag(most.max(most_anywhere).positive());
+        // Volts at which a shaft that friction holds just goes, and just stays.
+        let goes = (held + at(s.viscous_damping[1]) * self.slow_si - turn.torque) / turn.gain;
+        let stays = (held - turn.torque) / turn.gain;
+        let drives_anywhere = ((least_anywhere - drag).least(), most_anywhere);
+        Shape {
+            drives: ((least - drag).least(), most),
+            drives_anywhere,
+            brakes,
+            brakes_anywhere,
+            brakes_leaving: (at(turn.gain.low) / self.inertia.0 * self.scale).least(),
+            lets_go: (turn.top - goes).low,
+            stays: (turn.top - stays).high,
+            most_slowing: brakes_anywhere.1 * turn.range - drives_anywhere.0,
+        }
+    }
+
+    fn brake(&self) -> Shape {
+        let (s, scale, inertia) = (self.setup, self.scale, self.inertia);
+        let weak = (at(1.0) - at(s.ripple)) * at(s.brake_gain[0]);
+        let strong = (at(1.0) + at(s.ripple)) * at(s.brake_gain[1]);
+        let least_held = (self.rest.0.min(self.sliding.0) * weak).least();
+        let most_held = (self.rest.1.max(self.sliding.1) * strong).most();
+        let brakes_anywhere =
+            ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
+        let most_drive = (self.drive.1 / inertia.0 * scale).most();
+        let least_drive = (self.drive.0 / inertia.1 * scale - self.drag(most_drive)).least();
+        // With a delay the first ticks have what the brake had before.
+        let before = if s.delay_ticks > 0 { s.start_volts[1] } else { 0.0 };
+        let most_volts = (at(s.volts[1]) + self.volts_off).max(at(before));
+        Shape {
+            drives: (least_drive, most_drive),
+            drives_anywhere: (least_drive, most_drive),
+            brakes: (
+                (self.fast.0 * weak / inertia.1 * scale).least(),
+                (self.fast.1 * strong / inertia.0 * scale).most(),
+            ),
+            brakes_anywhere,
+            brakes_leaving: (least_held / inertia.0 * scale).least(),
+            lets_go: ((self.drive.0 - at(s.viscous_damping[1]) * self.slow_si) / most_held).low,
+            stays: (self.drive.1 / least_held).high,
+            most_slowing: brakes_anywhere.1 * most_volts - least_drive,
+        }
+    }
+}
+
+impl Shaft {
+    pub(crate) fn new(s: &Setup, cell: &Cell) -> Shaft {
+        let tau =
+            Interval { low: core::f64::consts::TAU.next_down(), high: core::f64::consts::TAU.next_up() };
+        let count = tau / at(f64::from(s.counts_per_rev));
+        let common = Common::new(s, cell, count);
+        let shape = match &s.motor {
+            Some(motor) => common.motor(motor),
+            None => common.brake(),
+        };
+        Shaft {
             count,
-            speed,
-            path: at(s.rate) / speed,
+            speed: common.speed,
+            path: at(s.rate) / common.speed,
             drives: shape.drives,
             drives_anywhere: shape.drives_anywhere,
             brakes: shape.brakes,
@@ -127,74 +235,14 @@ impl Shaft {
             brakes_leaving: shape.brakes_leaving,
             lets_go: shape.lets_go.max(0.0),
             stays: shape.stays,
-            slow: slow_si / speed,
-            volts_off,
+            slow: common.slow_si / common.speed,
+            volts_off: common.volts_off,
             kappa: at(s.smoothing),
             delay: s.delay_ticks as usize,
             counted_from: s.motor.map(|_| s.counted_from()),
             bend: (shape.drives.1.max(shape.drives_anywhere.1).max(shape.most_slowing) / at(8.0)).high,
             cap: cell.speed_cap,
-        };
-        // Drag of a shaft that has sped up all the tick.
-        let drag = |most_drive: Interval| {
-            at(s.viscous_damping[1]) / inertia.0 * period * (at(cell.speed_cap) + most_drive)
-        };
-        if let Some(motor) = &s.motor {
-            let ripple = Interval { low: 1.0 - s.ripple, high: 1.0 + s.ripple }.widened(LIBRARY);
-            let normal = ripple * at(motor.preload);
-            let friction =
-                |least: Interval, most: Interval| Interval { low: least.low, high: most.high } * normal;
-            let fast = friction(least_fast, most_fast);
-            let held = friction(rest.0.min(sliding.0), rest.1.max(sliding.1));
-            let turn = Turned {
-                gain: Interval { low: motor.gain[0], high: motor.gain[1] },
-                torque: Interval { low: weakest_drive.low, high: strongest_drive.high },
-                per: scale / Interval { low: s.inertia[0], high: s.inertia[1] },
-                top: at(s.counted_from()),
-                range: (at(s.counted_from()) - (at(s.volts[0]) - volts_off).min(at(s.start_volts[0]))).most(),
-            };
-            let ((least, most), brakes) = turn.lines(fast);
-            let ((least_anywhere, most_anywhere), brakes_anywhere) = turn.lines(held);
-            let drag = drag(most.max(most_anywhere).positive());
-            // Volts at which a shaft that friction holds just goes, and just stays.
-            let goes = (held + at(s.viscous_damping[1]) * slow_si - turn.torque) / turn.gain;
-            let stays = (held - turn.torque) / turn.gain;
-            let drives_anywhere = ((least_anywhere - drag).least(), most_anywhere);
-            return common(Shape {
-                drives: ((least - drag).least(), most),
-                drives_anywhere,
-                brakes,
-                brakes_anywhere,
-                brakes_leaving: (at(turn.gain.low) / inertia.0 * scale).least(),
-                lets_go: (turn.top - goes).low,
-                stays: (turn.top - stays).high,
-                most_slowing: brakes_anywhere.1 * turn.range - drives_anywhere.0,
-            });
         }
-        let weak = (at(1.0) - at(s.ripple)) * at(s.brake_gain[0]);
-        let strong = (at(1.0) + at(s.ripple)) * at(s.brake_gain[1]);
-        let least_held = (rest.0.min(sliding.0) * weak).least();
-        let most_held = (rest.1.max(sliding.1) * strong).most();
-        let brakes_anywhere =
-            ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
-        let most_drive = (strongest_drive / inertia.0 * scale).most();
-        let least_drive = (weakest_drive / inertia.1 * scale - drag(most_drive)).least();
-        // With a delay the first ticks have what the brake had before.
-        let before = if s.delay_ticks > 0 { s.start_volts[1] } else { 0.0 };
-        let most_volts = (at(s.volts[1]) + volts_off).max(at(before));
-        common(Shape {
-            drives: (least_drive, most_drive),
-            drives_anywhere: (least_drive, most_drive),
-            brakes: (
-                (least_fast * weak / inertia.1 * scale).least(),
-                (most_fast * strong / inertia.0 * scale).most(),
-            ),
-            brakes_anywhere,
-            brakes_leaving: (least_held / inertia.0 * scale).least(),
-            lets_go: ((weakest_drive - at(s.viscous_damping[1]) * slow_si) / most_held).low,
-            stays: (strongest_drive / least_held).high,
-            most_slowing: brakes_anywhere.1 * most_volts - least_drive,
-        })
     }
 
     /// A voltage as the set counts it.

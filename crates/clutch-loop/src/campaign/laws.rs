@@ -61,7 +61,7 @@ pub(super) const fn drawn(rig: RigName) -> &'static [&'static str] {
     match rig {
         RigName::Motor => &["pid", "smc", "ctc", "glide"],
         RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold", "glide"],
-        RigName::Bench => &["pd", "ctc", "smc", "glide"],
+        RigName::Bench => &["pd", "ctc", "smc", "pid", "glide"],
     }
 }
 
@@ -106,8 +106,15 @@ pub(super) fn of(law: &str) -> OfLaw {
         "smc_sign" => OfLaw { saturated_s: 5.0, switches: true, ..ALL },
         // Slow to let go at the start. Its error is in degrees, and its voltage as far off.
         "pid" => OfLaw {
-            brake: |_| "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            brake: |s| {
+                // The bench's friction rises and falls along the disc.
+                let stiff = "kp_v_rad = 600.0\nki_v_rad_s = 3000.0\nkd_v_s_rad = 8.0\n";
+                let soft = "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n";
+                if s.rig == RigName::Bench { stiff } else { soft }.to_owned()
+            },
             motor: "kp_v_rad = 200.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 4.0\n",
+            // It creeps ahead at a slow start on an uneven disc, and waits with the whole brake for its path.
+            saturated_s: 0.6,
             following_deg: 6.0,
             healthy_deg: 3.0,
             lets_go_above_deg_s: 6.0,

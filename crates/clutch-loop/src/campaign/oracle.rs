@@ -228,7 +228,8 @@ fn hardware(s: &HealthyRun, t: &Trouble, kind: FaultKind, base: &Promise) -> Pro
             if by < 1.0 && exact && moves && t.at > 0.0 && s.path.slowest_deg_s() >= 15.0 =>
         {
             let causes = &[Cause::TooSlow, Cause::StandStill, Cause::TooFast, Cause::Clock];
-            Promise { fate: Fate::Ends(0.04), causes, ..blind }
+            // After twice 20 ms it is the clock, at the latest.
+            Promise { fate: Fate::Ends(0.04 + PERIOD), causes, ..blind }
         }
         FaultKind::Prescaler(by) | FaultKind::Crystal(by) => clock(s, t, by, by, &blind),
         _ => *base,

@@ -5,10 +5,10 @@
 
 mod board;
 mod board_controller;
+mod board_program;
 mod controller;
+mod controller_lockstep;
 mod desk;
-mod hardware;
 mod limits;
-mod lockstep;
 mod one_chip;
 mod settings;

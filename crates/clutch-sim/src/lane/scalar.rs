@@ -1,4 +1,4 @@
-//! The numbers of one run. What it asks a function of many of them at once goes through a vector, whose lanes have the bits
+//! The numbers of one run. A function of many of them at once goes through a vector, whose lanes have the bits
 //! of `libm`.
 
 use super::Lane;

@@ -1,4 +1,4 @@
-//! What Dormand and Prince's steps keep of shafts in lanes, and of a motion between two of its steps.
+//! The memory of Dormand and Prince's steps: of shafts in lanes, and of a motion between two of its steps.
 
 use super::alike::{Alike, Begin};
 use crate::drive::Drive;

@@ -166,7 +166,7 @@ impl<V: Lane> Layer<V> {
     }
 }
 
-/// What motions that end need.
+/// The needs of motions that end.
 struct After<'a, V: Lane> {
     all: &'a mut [Shafts<V>],
     flows: &'a [Flow<f64>],

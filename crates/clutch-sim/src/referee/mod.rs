@@ -17,7 +17,6 @@ mod model;
 mod observe;
 mod signal;
 mod trajectory;
-mod unposed;
 
 pub use case::{Case, CaseError, Expect};
 pub use engines::{ENGINES, RefereeEngine, RefereeError, run};

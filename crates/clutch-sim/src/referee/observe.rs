@@ -1,4 +1,4 @@
-//! What a case observes of a trajectory.
+//! The observations that a case makes of a trajectory.
 
 use super::model::Model;
 use crate::metrics::{Detected, Metrics, figure_columns};

@@ -41,13 +41,13 @@ pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2], motor: bool) -
             let ahead = coulomb + velocity * rate;
             let forward = if motor { bias + ahead } else { bias - ahead };
             if ki > 0.0 {
-                Gains::Pid { kp, ki, kd, forward, tracking: tracking_time, limits }
+                Gains::Integral { kp, ki, kd, forward, tracking: tracking_time, limits }
             } else {
-                Gains::Pd { kp, kd, forward }
+                Gains::Linear { kp, kd, forward }
             }
         }
         SampledForm::Layer { .. } if motor => return None,
-        SampledForm::Layer { kp, kd, slope, boundary } => Gains::Smc { kp, kd, slope, boundary },
+        SampledForm::Layer { kp, kd, slope, boundary } => Gains::Layer { kp, kd, slope, boundary },
     })
 }
 
@@ -181,7 +181,7 @@ impl Scenario {
         let gains = gains(law, rate, limits, motor).ok_or_else(|| not("law", law.title(), covered))?;
         // The law takes back what a limit cuts off such a voltage.
         match gains {
-            Gains::Pd { forward, .. } | Gains::Pid { forward, .. }
+            Gains::Linear { forward, .. } | Gains::Integral { forward, .. }
                 if !(limits[0]..=limits[1]).contains(&forward) =>
             {
                 Err(not("law.pid", "a feed-forward beyond the output's limits", "one within them"))

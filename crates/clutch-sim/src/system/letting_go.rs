@@ -60,7 +60,7 @@ fn left<const N: usize, const B: usize>(
     (hold(&a, &b, bound, stuck), STILL * largest)
 }
 
-/// What loads and bounds are within a step.
+/// Loads and bounds within a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value<const N: usize, const B: usize> {
     /// Its time as a share of the step.
@@ -128,7 +128,7 @@ impl<'m, S: System<N, B>, const N: usize, const B: usize> Search<'m, S, N, B> {
         let (begin, end) = (&a.equations, &b.equations);
         let told = system.curvature(from, from + h);
         let (mut load, mut normal) = told.unwrap_or_else(|| (SVector::zeros(), SVector::zeros()));
-        // What moves bends the load, too: no bound of that is known, and its values within the step are looked at.
+        // Motion bends the load, too: no bound of that is known, and its values within the step are looked at.
         let (first, last) = (Value::of(0.0, begin), Value::of(1.0, end));
         let seen = match between {
             Some([early, late]) => Some([first, early, late, last]),

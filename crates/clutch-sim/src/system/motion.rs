@@ -247,7 +247,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if now >= to {
                 return Ok(());
             }
-            // What jumps at the end of the call does so in it.
+            // A jump at the end of the call is in it.
             let corner = self.system.corner(now).filter(|corner| *corner <= to);
             let end = corner.unwrap_or(to);
             let most = self.step.min(self.system.longest_step());
@@ -312,7 +312,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             Some((_, at)) => *at,
             None => Instant::of(0.0, self.equations(&self.state)?, &stuck),
         };
-        // What jumps at the end has not done so within the step.
+        // A jump at the end is not within the step.
         let end = if jumps {
             self.equations(&State { time: step.to.time.next_down(), ..step.to })?
         } else {

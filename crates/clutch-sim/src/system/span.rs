@@ -1,4 +1,4 @@
-//! What rows hold together: independent directions of theirs, each with the rows that make it up.
+//! Directions that rows hold together: independent ones, each with the rows that make it up.
 
 use nalgebra::{SMatrix, SVector};
 

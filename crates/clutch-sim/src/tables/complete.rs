@@ -3,6 +3,7 @@
 use super::Points;
 use super::suggest::{correction, expected, nearest};
 use crate::scenario_error::ScenarioError;
+use crate::unposed::asks;
 use clutch_core::params::{ChoiceInfo, Info, Kind, Row, TableInfo};
 use toml::{Table, Value};
 
@@ -60,7 +61,7 @@ pub(crate) fn complete_table(
         return Err(unknown_key(origin, path, unknown, table.get(unknown), &keys));
     }
     let mut whole = Table::new();
-    // What is wrong goes before what is missing: the reader has written it.
+    // A wrong value goes before a missing one: the reader has written it.
     let mut lacks: Option<ScenarioError> = None;
     for (key, entry) in &keys {
         let at = join(path, key);
@@ -247,6 +248,12 @@ fn unknown_key(
     let former = MOVED.iter().find(|(old, _)| *old == whole);
     let gone = GONE.contains(&whole.as_str()).then(|| ": it is gone, leave it out".to_owned());
     let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(gone).or(moved);
+    let unposed =
+        (whole.starts_with("rig.") || whole.starts_with("model.")).then(|| asks(&whole, unknown)).flatten();
+    if let (None, Some(what)) = (&moved, unposed) {
+        let message = format!("unknown key: it asks for {what} (docs/systems.md)");
+        return ScenarioError::new(origin, &whole, &value.map(shown).unwrap_or_default(), message);
+    }
     let hint = moved.unwrap_or_else(|| correction(unknown, value, &names));
     let shown = value.filter(|v| !v.is_table()).map(shown).unwrap_or_default();
     let message = format!("unknown key{}", expected(&hint, &names));

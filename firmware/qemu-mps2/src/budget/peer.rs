@@ -25,7 +25,7 @@ pub struct PeerLaw<const N: usize> {
     pub output: PeerOutput,
 }
 
-/// What a law remembers: the offset of a bumpless start, then of PID `peer_pid_memory`.
+/// The memory of a law: the offset of a bumpless start, then of PID `peer_pid_memory`.
 pub type Memory<const M: usize> = [f32; M];
 
 type Step<const N: usize, const M: usize> =

@@ -152,7 +152,7 @@ fn measure_chip(random: &mut Random) -> Option<()> {
     let mut glide = tally("chip_code_glide", "chip_goes_on_glide", "chip_period_glide");
     let laws = LawParams::<f32>::all();
     for kind in 0..RUNS {
-        let glides = matches!(laws.get(kind as usize % laws.len())?, LawParams::Glide(_));
+        let glides = laws.get(kind as usize % laws.len())?.filter().is_some();
         let [code, goes_on, any] = match kind % 5 {
             // Bounded apart, and not both at once.
             3 | 4 if glides => continue,

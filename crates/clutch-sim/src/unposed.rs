@@ -1,4 +1,5 @@
-//! Demands of a case that no engine here follows: named by its key, before any other mistake of the file.
+//! Demands that no engine here follows: of a case they are named by its key before any other mistake of the file, of a scenario
+//! where its key is unknown.
 
 use toml::{Table, Value};
 
@@ -16,7 +17,7 @@ const REACTIONS: &str = "a normal force that depends on reactions; the normal fo
 const NORMAL_OF: [&str; 5] = ["of", "row", "joint", "joints", "share"];
 
 /// The first key that asks for what cannot be posed, and what that is.
-pub(super) fn unposed(file: &Table) -> Option<(String, &'static str)> {
+pub(crate) fn unposed(file: &Table) -> Option<(String, &'static str)> {
     ["mechanism", "impact", "backlash", "gap", "restitution"]
         .into_iter()
         .find_map(|key| in_value(key, key, file.get(key)?))
@@ -46,7 +47,7 @@ fn in_value(path: &str, key: &str, value: &Value) -> Option<(String, &'static st
 }
 
 /// Demand of the last key of a path, if it cannot be posed.
-fn asks(path: &str, key: &str) -> Option<&'static str> {
+pub(crate) fn asks(path: &str, key: &str) -> Option<&'static str> {
     let key = key.to_ascii_lowercase();
     let within_normal = path.split('.').rev().skip(1).any(|part| part.starts_with("normal"));
     if key.starts_with("normal_")

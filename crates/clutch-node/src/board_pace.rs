@@ -10,7 +10,7 @@ const UNCONSENTED_US: u32 = 1_000_000;
 
 /// Arrivals of samples.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct HostPace {
+pub(crate) struct BoardPace {
     /// Arrival of the sample that the next one is held against, ns, and its number.
     last: Option<(u64, u16)>,
     /// The newest of those that came at once: a burst makes up for a stall, and its last one shows by how much.
@@ -21,10 +21,10 @@ pub(crate) struct HostPace {
     pub(crate) off: Option<i32>,
 }
 
-impl HostPace {
+impl BoardPace {
     /// Consent: samples come as they are made from now on.
     pub(crate) fn consent(&mut self) {
-        *self = HostPace { consented: true, off: self.off, ..HostPace::default() };
+        *self = BoardPace { consented: true, off: self.off, ..BoardPace::default() };
     }
 
     /// A sample arrives. A board that is given more time before its silence counts, counts periods as slowly.

@@ -1,6 +1,6 @@
 //! Lockstep: what is written is read, and half of it is not.
 
-use clutch_node::lockstep::{Exchange, HEAD, LONGEST};
+use clutch_node::controller_lockstep::{Exchange, HEAD, LONGEST};
 use proptest::prelude::*;
 
 proptest! {
