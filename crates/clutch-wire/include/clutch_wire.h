@@ -143,7 +143,7 @@ static inline int32_t clutch_get_i32(const uint8_t *at)
     return value;
 }
 
-/* A list: how many numbers, and each. What is too much is left out. */
+/* A list: how many numbers, and each. Numbers beyond its room are left out. */
 static inline void clutch_put_list(uint8_t *at, const uint32_t *numbers, uint8_t count)
 {
     uint8_t i;

@@ -2,7 +2,7 @@
 exceptions and NVIC, virtual time, the exchange with the host, and the count of instructions. `stm32g474.py` and
 `rp2040.py` have the registers of a chip each.
 
-Here is all that Unicorn leaves out. Code takes no time. Time goes on only while the core sleeps (WFI) with nothing to do,
+Here is what Unicorn leaves out. Code takes no time. Time goes on only while the core sleeps (WFI) with nothing to do,
 or spins for ever. An interrupt is taken when the core sleeps, when a handler returns, and after an instruction that may
 unmask it. Bytes that the serial line sends are gone at once; bytes for its receiver come when the host gives them.
 
