@@ -827,9 +827,10 @@ def lowest_smooth_speed(scenario: _model.Scenario | Scenario, rates: Sequence[fl
     cell.
     """
 
-def main(args: Sequence[str]) -> int:
+def main(args: Sequence[str], images: str | PathLike[str]) -> int:
     """
-    Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
+    Runs the `clutch` command with these arguments, the program's name first; gives its exit code. The package's images of
+    boards are in the folder `images`.
     """
 
 def read_log(path: str | PathLike[str]) -> Log:

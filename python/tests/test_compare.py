@@ -73,9 +73,9 @@ def test_what_cannot_be_compared_is_named(both):
 
 
 def test_the_commands_comparison_has_the_same_figures_and_window(capfd):
-    from clutch import _clutch
+    from clutch import _cli, _clutch
 
-    assert _clutch.main(["clutch", "compare", "bench_pd_2", "bench_smc_2", "--json"]) == 0
+    assert _clutch.main(["clutch", "compare", "bench_pd_2", "bench_smc_2", "--json"], _cli.IMAGES) == 0
     told = json.loads(capfd.readouterr().out)
     ours = compare("bench_pd_2", "bench_smc_2")
     for run, result in zip(told["runs"], ours, strict=True):

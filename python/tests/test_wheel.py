@@ -5,6 +5,7 @@ import copy
 import importlib
 import inspect
 import json
+import os
 import pickle
 import re
 import subprocess
@@ -614,3 +615,12 @@ def test_reproduce_gives_the_commands_claims_and_table(clutch, tmp_path):
     assert paper.table3["reduction_percent"].tolist() == [r["reduction_percent"] for r in theirs["table3"]]
     assert paper.as_documented
     assert [f.number for f in paper.figures] == [8, 9, 10]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="boards are followed on Linux")
+def test_images_of_boards_that_a_wheel_brings_are_looked_for_in_the_package(tmp_path):
+    code = "import sys; sys.argv = ['clutch', 'hil', '--image', 'nucleo-daq', 'board_smc_2']; from clutch import _cli; "
+    environment = {key: value for key, value in os.environ.items() if key != "CLUTCH_IMAGES"}
+    run = [sys.executable, "-c", code + "_cli.IMAGES = _cli.Path('brought'); sys.exit(_cli.main())"]
+    told = subprocess.run(run, capture_output=True, text=True, cwd=tmp_path, env=environment)
+    assert told.returncode != 0 and "brought/nucleo-daq" in told.stderr, told.stderr

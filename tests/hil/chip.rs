@@ -99,6 +99,23 @@ fn laws_on_a_core_without_floating_point_are_the_simulation_bit_for_bit() {
     figures_and_codes_are_the_simulations(PICO_DAQ.0, PICO_DAQ.1, "smc");
 }
 
+/// Without it the flash's waits come in full, and both estimates are one.
+#[test]
+fn the_prefetch_of_the_flash_is_on_in_the_images_of_the_nucleo() {
+    for (name, role) in [IMAGES[0], IMAGES[1]] {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let file = std::env::temp_dir().join(format!("clutch-{}-{name}.json", std::process::id()));
+        let chip = ChipOptions { count: Some(file.clone()), ..ChipOptions::default() };
+        let report = session(&scenario("smc", 0.2), role, chip).run(&image).expect("the chip runs");
+        std::fs::remove_file(&file).expect("the counts are there");
+        let counted = report.counted.expect("instructions are counted");
+        let mean = |key: &str| counted["period"][key]["mean"].as_f64().expect("a number");
+        let (best, without) = (mean("estimated_us"), mean("estimated_us_without_prefetch"));
+        assert!(0.0 < best && best < 0.8 * without, "{name}: {best} µs, {without} µs without");
+    }
+}
+
 /// A law with memory begins with the voltage that the brake has: on a board its power-up output, in the simulation
 /// what holds the shaft at rest; and so does an actuator with a lag. The same node on this machine begins as the chip
 /// does.

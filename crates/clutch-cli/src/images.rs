@@ -3,6 +3,7 @@
 use anyhow::bail;
 use clutch_sim::nearest;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The images that are found without a path, and their targets: `cargo xtask firmware build` leaves them in the folder
 /// of their target.
@@ -14,11 +15,14 @@ const NAMES: [(&str, &str); 5] = [
     ("pico-daq", "thumbv6m-none-eabi"),
 ];
 
+/// The folder of a package that brings images beside a command that is no file of its own.
+pub(crate) static PACKAGED: OnceLock<PathBuf> = OnceLock::new();
+
 /// Where the images of an archive are, beside the command or, where that is in a folder `bin`, beside this folder.
 const BESIDE: [&str; 2] = ["share/clutch/images", "../share/clutch/images"];
 
 /// A file; or, for a name, the first image of that name: in $CLUTCH_IMAGES alone if it is set, else in the tree that
-/// this is run in, else beside the command.
+/// this is run in, else in the package or beside the command.
 ///
 /// # Errors
 /// There is none; all places are named.
@@ -45,7 +49,8 @@ pub(crate) fn image(named: PathBuf) -> anyhow::Result<PathBuf> {
     let command = std::env::current_exe().ok();
     let beside = command.as_deref().and_then(Path::parent);
     let beside = beside.into_iter().flat_map(|folder| BESIDE.map(|place| folder.join(place)));
-    let places: Vec<PathBuf> = std::iter::once(built).chain(beside).map(|place| place.join(&named)).collect();
+    let places = std::iter::once(built).chain(PACKAGED.get().cloned()).chain(beside);
+    let places: Vec<PathBuf> = places.map(|place| place.join(&named)).collect();
     if let Some(image) = places.iter().find(|place| place.is_file()) {
         return Ok(image.clone());
     }

@@ -141,6 +141,16 @@ fn suggest(e: &mut clap::Error, args: &[OsString]) {
     }
 }
 
+/// Runs the command out of a package, which brings images of boards in this folder; as [`main`].
+#[must_use]
+pub fn main_of_package(args: impl IntoIterator<Item = OsString>, images: std::path::PathBuf) -> u8 {
+    #[cfg(target_os = "linux")]
+    let _ = images::PACKAGED.set(images);
+    #[cfg(not(target_os = "linux"))]
+    drop(images);
+    main(args)
+}
+
 /// Runs the command with its arguments, the program's name first; its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {

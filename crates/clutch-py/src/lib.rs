@@ -19,10 +19,12 @@ mod tune;
 
 use pyo3::prelude::*;
 
-/// Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
+/// Runs the `clutch` command with these arguments, the program's name first; gives its exit code. The package's images of
+/// boards are in the folder `images`.
 #[pyfunction]
-fn main(py: Python<'_>, args: Vec<std::ffi::OsString>) -> u8 {
-    py.detach(|| clutch_cli::main(args))
+#[pyo3(signature = (args, images))]
+fn main(py: Python<'_>, args: Vec<std::ffi::OsString>, images: std::path::PathBuf) -> u8 {
+    py.detach(|| clutch_cli::main_of_package(args, images))
 }
 
 /// The native half of the package `clutch`.

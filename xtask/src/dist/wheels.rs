@@ -2,9 +2,9 @@
 
 use super::machine::{Machine, PYTHON_WINDOWS_VERSION, Results, python_arm64, python_windows};
 use super::tools::{GLIBC, LINUX, LINUX_ARM64, Tools, WINDOWS, names_no_folder};
-use super::{Made, folder, name, work};
+use super::{Made, folder, images, name, work};
 use crate::python;
-use crate::run::program;
+use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,8 +12,12 @@ use std::time::Instant;
 pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     let manylinux = format!("manylinux_{}", GLIBC.replace('.', "_"));
     let zig = ["--zig", "--compatibility", &manylinux, "--auditwheel", "check"];
-    let linux = wheel(tools, LINUX, &zig)?;
-    let (arm64, windows) = (wheel(tools, LINUX_ARM64, &zig)?, wheel(tools, WINDOWS, &[])?);
+    // Boards are followed on Linux alone.
+    let packaged = root().join("python/clutch/images");
+    images::stripped(&packaged)?;
+    let (linux, arm64) = (wheel(tools, LINUX, &zig), wheel(tools, LINUX_ARM64, &zig));
+    std::fs::remove_dir_all(&packaged)?;
+    let (linux, arm64, windows) = (linux?, arm64?, wheel(tools, WINDOWS, &[])?);
     let source = work("sdist")?;
     tools.program("maturin").args(["sdist", "--out"]).arg(&source).run()?;
     let archive = kept(&python::the_one(&source, ".tar.gz")?)?;
@@ -76,6 +80,8 @@ fn first_picture(tools: &Tools, wheel: &Path) -> Result<(PathBuf, String)> {
     program(clean.join("bin/clutch")).within(&folder).args(["sim", "smc_2", "--plot", "first.png"]).run()?;
     let drawn = begin.elapsed().as_secs_f64();
     is_picture(&picture)?;
+    // The images come with it.
+    program(clean.join("bin/clutch")).within(&folder).args(["hil", "board_smc_2", "--quiet"]).run()?;
     let plot = "import clutch; clutch.simulate('smc_2').plot().savefig('second.png')";
     program(clean.join("bin/python")).within(&folder).args(["-c", plot]).env("MPLBACKEND", "agg").run()?;
     is_picture(&folder.join("second.png"))?;

@@ -297,9 +297,13 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     let refused = !links && text.contains("__panic_path_survived");
     tally.check("the link test sees a panic that is put in (control)", refused);
     if has_objdump() || std::env::var_os("CI").is_some() {
-        // The one that is put in is compiled into its caller.
         let named = panicking(image("rustc", &with_one))?;
-        tally.check("the function with a panic that is put in is named (control)", named.contains("_start"));
+        let (one, place) = ("no_panic::control", "tests/no_panic/src/main.rs");
+        let told = named.lines().any(|line| line.contains(one) && line.contains(place));
+        tally.check_seen(
+            "the function with a panic that is put in is named, with its line (control)",
+            (told, named),
+        );
     } else {
         println!("skipped: the name of a function with a panic: {OBJDUMP} is not installed");
         tally.skip(1);
@@ -310,14 +314,15 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
 /// The folder of the link test's builds.
 const NO_PANIC: &str = "target/no_panic";
 
-/// It names functions of an image; a Debian package has it that a user may not have.
+/// They name places in an image; a Debian package has them that a user may not have.
 const OBJDUMP: &str = "arm-none-eabi-objdump";
+const ADDR2LINE: &str = "arm-none-eabi-addr2line";
 
 fn has_objdump() -> bool {
     program(OBJDUMP).args(["--version"]).silently().is_ok_and(|(runs, _)| runs)
 }
 
-/// The functions of the link test's image that call for a panic: the image is linked all the same, and read.
+/// The places of the link test's image that call for a panic: the image is linked all the same, and read.
 fn panicking(image: Program) -> Result<String> {
     let survives = ["--", "-C", "link-arg=--defsym=__panic_path_survived=0"];
     let (built, text) = image.args(survives).silently()?;
@@ -325,21 +330,24 @@ fn panicking(image: Program) -> Result<String> {
         return Ok(text);
     }
     let linked = root().join(NO_PANIC).join(firmware::TARGET).join("release/no-panic");
-    let Ok((true, code)) = program(OBJDUMP).args(["-d", "-C"]).arg(linked).silently() else {
+    let Ok((true, code)) = program(OBJDUMP).args(["-d", "-C"]).arg(&linked).silently() else {
         return Ok(format!("{OBJDUMP} would name the functions that panic; it is not installed"));
     };
-    let (mut function, mut found) = ("", Vec::new());
+    let (mut within, mut calls) = ("", Vec::new());
     for line in code.lines() {
         if line.ends_with(">:") {
-            function = line;
+            within = line;
         } else if line.contains("<core::panicking")
-            && !function.contains("<core::panicking")
-            && !found.contains(&function)
+            && !within.contains("<core::panicking")
+            && let Some((at, _)) = line.split_once(':')
         {
-            found.push(function);
+            calls.push(format!("0x{}", at.trim()));
         }
     }
-    Ok(format!("functions with a path to a panic:\n{}", found.join("\n")))
+    // With all that is compiled into its caller, the innermost first.
+    let (_, text) =
+        program(ADDR2LINE).args(["-i", "-f", "-C", "-p", "-a", "-e"]).arg(&linked).args(&calls).silently()?;
+    Ok(format!("paths to a panic:\n{text}"))
 }
 
 /// The libraries for C, and the check that no panic can be reached in them.

@@ -37,7 +37,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import arm_const as arm
@@ -704,6 +704,14 @@ def symbols(image: bytes) -> list[tuple[bytes, int]]:
     return found
 
 
+class Counts(NamedTuple):
+    """Instructions so far, their cycles at the lower estimate, and those that come on top without a prefetch."""
+
+    executed: int
+    cycles: int
+    hidden: int
+
+
 class Meter(ABC):
     """Counts instructions, and estimates their cycles. The cost of an instruction, and of a wait for the flash, is the
     chip's own."""
@@ -715,14 +723,15 @@ class Meter(ABC):
 
     def __init__(self, chip: Chip) -> None:
         self.chip, self.executed, self.cycles = chip, 0, 0
+        self.hidden = 0  # cycles that a prefetch saves at best, and may not
         self.cost: dict[int, int] = {}
         self.next = 0
-        self.woke: tuple[int, int] | None = None
-        self.sample: tuple[int, int] | None = None
-        self.bytes: tuple[int, int] | None = None
-        self.out: tuple[int, int] | None = None
+        self.woke: Counts | None = None
+        self.sample: Counts | None = None
+        self.bytes: Counts | None = None
+        self.out: Counts | None = None
         self.kind = "other"
-        self.counted: dict[str, list[tuple[int, int]]] = {}
+        self.counted: dict[str, list[Counts]] = {}
         chip.uc.hook_add(uc_const.UC_HOOK_CODE, self.instruction)
         chip.uc.hook_add(uc_const.UC_HOOK_MEM_READ, self.load, None, chip.FLASH.start, chip.FLASH.stop - 1)
 
@@ -750,12 +759,12 @@ class Meter(ABC):
     def load(self, _uc: Uc, _kind: int, at: int, _size: int, _value: int, _data: Any) -> None:
         self.loaded(at)
 
-    def now(self) -> tuple[int, int]:
-        return self.executed, self.cycles
+    def now(self) -> Counts:
+        return Counts(self.executed, self.cycles, self.hidden)
 
-    def since(self, name: str, begin: tuple[int, int], end: tuple[int, int]) -> None:
+    def since(self, name: str, begin: Counts, end: Counts) -> None:
         if self.chip.faults & Fault.METERED:
-            self.counted.setdefault(name, []).append((end[0] - begin[0], end[1] - begin[1]))
+            self.counted.setdefault(name, []).append(Counts(*(e - b for b, e in zip(begin, end, strict=True))))
 
     def wakes(self) -> None:
         if not self.woke:
@@ -780,18 +789,20 @@ class Meter(ABC):
         self.woke = self.sample = self.bytes = self.out = None
 
     def report(self) -> dict[str, Any]:
-        """Lowest, mean and highest number of instructions, and of estimated microseconds, by what they were for."""
+        """Lowest, mean and highest number of instructions, and of estimated microseconds, by what they were for: with
+        the best that a prefetch can do, if the image switches one on, and without any."""
 
         def figures(numbers: list[float]) -> dict[str, float]:
             return {"lowest": min(numbers), "mean": sum(numbers) / len(numbers), "highest": max(numbers)}
 
         return {
             name: {
-                "count": len(pairs),
-                "instructions": figures([float(executed) for executed, _ in pairs]),
-                "estimated_us": figures([cycles / self.CLOCK_MHZ for _, cycles in pairs]),
+                "count": len(many),
+                "instructions": figures([float(one.executed) for one in many]),
+                "estimated_us": figures([one.cycles / self.CLOCK_MHZ for one in many]),
+                "estimated_us_without_prefetch": figures([(one.cycles + one.hidden) / self.CLOCK_MHZ for one in many]),
             }
-            for name, pairs in self.counted.items()
+            for name, many in self.counted.items()
         }
 
 

@@ -688,15 +688,15 @@ class FlashMeter(Meter):
     The estimate assumes: one cycle for an instruction, two for a load, more for what moves several registers,
     divides, or multiplies and adds in floating point, as the core's manual has them; two for a branch that is taken;
     12 and 10 for a handler's begin and end. Flash is read by 64 bits with four wait states, into an instruction
-    cache of 1 KB and a data cache of 256 bytes, each by least recent use. The prefetch, which the image switches on,
+    cache of 1 KB and a data cache of 256 bytes, each by least recent use. The prefetch, where the image switches it on,
     is taken to read the next 64 bits while those before are executed, and to be held up by no load and no jump: a best
-    case. With PREFETCH = False there is none: a worst case. Which of them the chip is nearer to was not measured. No
-    account is taken of how instructions overlap, nor of waits for the peripherals' buses.
+    case. The waits that it hides so are counted beside it: with them there is no prefetch, a worst case. Which of the
+    two the chip is nearer to was not measured. No account is taken of how instructions overlap, nor of waits for the
+    peripherals' buses.
     """
 
     BRANCH, CLOCK_MHZ, ENTRY, EXIT = 2, 170, 12, 10
     WAIT_STATES = 4
-    PREFETCH = True
     CODE_WORDS, DATA_WORDS = 128, 32  # of 64 bits
 
     def __init__(self, chip: Chip) -> None:
@@ -713,24 +713,32 @@ class FlashMeter(Meter):
         word = at >> 3
         if word == self.word:
             return
-        waits = self.WAIT_STATES
-        if self.PREFETCH and word == self.word + 1:
-            waits = min(waits, max(0, self.ahead - self.cycles))
+        follows = word == self.word + 1
         self.word = word
-        self.fetch(self.code, word, self.CODE_WORDS, waits)
+        if not self.cached(self.code, word, self.CODE_WORDS):
+            waits = self.WAIT_STATES
+            if follows and self.prefetches():
+                waits = min(waits, max(0, self.ahead - self.cycles))
+                self.hidden += self.WAIT_STATES - waits
+            self.cycles += waits
         self.ahead = self.cycles + self.WAIT_STATES
 
     def loaded(self, at: int) -> None:
-        self.fetch(self.data, at >> 3, self.DATA_WORDS, self.WAIT_STATES)
+        if not self.cached(self.data, at >> 3, self.DATA_WORDS):
+            self.cycles += self.WAIT_STATES
 
-    def fetch(self, cache: OrderedDict[int, None], word: int, words: int, waits: int) -> None:
+    def prefetches(self) -> bool:
+        return bool(self.chip.uc.mem_read(0x4002_2001, 1)[0] & 1)  # FLASH_ACR.PRFTEN
+
+    def cached(self, cache: OrderedDict[int, None], word: int, words: int) -> bool:
+        """True if the word is there; from now on it is."""
         if word in cache:
             cache.move_to_end(word)
-            return
-        self.cycles += waits
+            return True
         cache[word] = None
         if len(cache) > words:
             cache.popitem(last=False)
+        return False
 
 
 def cycles_of(code: bytes) -> int:
