@@ -1,5 +1,6 @@
 //! Images of the boards: built, flashed, measured.
 
+use crate::python;
 use crate::run::{Program, cargo, program, root};
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
@@ -35,6 +36,9 @@ pub(crate) enum Verb {
     Budget,
     /// Prints the deepest stack.
     Stack,
+    /// Runs the Pico's image on rp2040js, an emulator that shares no code with the model of its chip (docs/firmware.md):
+    /// each code is that of the model. Asks for npm, and for an image that is built.
+    Rp2040js,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -60,6 +64,15 @@ pub(crate) fn run(verb: &Verb) -> Result<()> {
         Verb::Size => report("size"),
         Verb::Budget => report("budget"),
         Verb::Stack => report("stack"),
+        Verb::Rp2040js => {
+            if !fetch_rp2040js() {
+                bail!("npm cannot fetch rp2040js");
+            }
+            cargo(["build", "--package", "clutch-cli"]).run()?;
+            let (same, text) = on_rp2040js(&root().join("target/debug/clutch"))?;
+            print!("{text}");
+            if same { Ok(()) } else { bail!("the codes differ, or there are none") }
+        }
     }
 }
 
@@ -118,6 +131,39 @@ fn flash(board: Flashed, role: Role) -> Result<()> {
     let image = folder(package.1).join(format!("{name}-{role}"));
     program("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&image).run()?;
     program("probe-rs").args(["reset", "--chip", chip]).run()
+}
+
+fn rp2040js() -> PathBuf {
+    root().join("firmware/pico-rp2040/emulator")
+}
+
+/// True if rp2040js is there, or could be fetched.
+pub(crate) fn fetch_rp2040js() -> bool {
+    let install = ["install", "--no-package-lock", "--no-audit", "--no-fund", "--loglevel=error"];
+    rp2040js().join("node_modules/rp2040js").exists()
+        || program("npm").args(install).within(&rp2040js()).quietly().is_ok_and(|(fetched, _)| fetched)
+}
+
+/// Records what passes between a run and the model of the Pico's chip, and replays it on rp2040js; true if each code is the same.
+pub(crate) fn on_rp2040js(command: &Path) -> Result<(bool, String)> {
+    let record = root().join("target/rp2040js");
+    std::fs::create_dir_all(&record)?;
+    let image = folder("thumbv6m-none-eabi").join("pico-controller");
+    let run = program(command).args([
+        "hil",
+        "examples/pico_smc_2.toml",
+        "--set",
+        "run.duration_s=1.2",
+        "--quiet",
+        "--image",
+    ]);
+    let run = run.arg(&image).env("RECORD", &record).env("PYTHON", python::interpreter()?);
+    let (ran, text) = run.env("CLUTCH_PYTHON", rp2040js().join("record.sh")).quietly()?;
+    if !ran {
+        return Ok((false, text));
+    }
+    let replay = program("node").arg(rp2040js().join("replay.mjs")).arg(&image);
+    replay.args([record.join("requests"), record.join("answers")]).quietly()
 }
 
 fn report(what: &str) -> Result<()> {

@@ -20,9 +20,9 @@ use tally::Tally;
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
 /// Checks that need the targets: two builds of the core, one of the nodes and one of the parts of boards each, the four
-/// link tests, the libraries with their control, the example, two boards, the budgets.
+/// link tests, the libraries with their control, the example, two boards, the other emulator, the budgets.
 const SKIPPED_WITHOUT_TARGETS: u64 =
-    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 7;
+    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 8;
 
 /// The packages that are built for this machine, the command with all its options. Always the same selection: with another
 /// one cargo gives libraries other features, and compiles them once more. The wheel's module, which only links inside of
@@ -263,6 +263,13 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
         tally.check_quiet(&format!("the images of {} build", board.0), firmware::image(board).quietly()?);
         let small = firmware::image(board).args(SMALL).args(["--target-dir", "../target/firmware_small"]);
         tally.check_quiet(&format!("they build at opt-level s ({})", board.0), small.quietly()?);
+    }
+    let same = "pico-controller gives the codes on rp2040js that it gives on the model of its chip";
+    if firmware::fetch_rp2040js() {
+        tally.check_quiet(same, firmware::on_rp2040js(&command())?);
+    } else {
+        println!("skipped: {same}, because npm cannot fetch it");
+        tally.skip(1);
     }
     tally.stage("budgets");
     // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
