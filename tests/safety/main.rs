@@ -226,7 +226,7 @@ fn the_log_calls_states_causes_and_arrivals_as_the_core_does() {
 }
 
 #[test]
-fn healthy_runs_of_every_law_and_path_are_never_ended() {
+fn healthy_runs_of_pd_ctc_and_smc_on_ramps_are_never_ended() {
     // Ten simulated minutes on both rigs, at 2 and 20 °/s, without a fault.
     for law in ["pd", "ctc", "smc"] {
         for rig in ["paper", "bench"] {

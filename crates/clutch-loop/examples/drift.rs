@@ -223,7 +223,7 @@ struct Group {
 /// the least is an alarm.
 fn healthy(drawn: u64) -> Outcome<()> {
     let mut groups = vec![Group {
-        name: "drawn from ±40 % of friction, half to twice the load, all laws and paths".to_owned(),
+        name: "drawn from ±40 % of friction, half to twice the load, PD, CTC, SMC, PID and glide on all kinds of paths".to_owned(),
         runs: (1..=drawn).map(|seed| Healthy { seed, seconds: 60 }.scenario()).collect::<Result<_, _>>()?,
     }];
     for (name, law) in LAWS {

@@ -62,12 +62,6 @@ impl<L: LockstepBoard, P: Planned<f32>> LockstepHost<L, P> {
         &mut self.link
     }
 
-    /// The link alone.
-    #[must_use]
-    pub fn into_link(self) -> L {
-        self.link
-    }
-
     /// The host's frames and these bytes go to the board; the board's frames come back.
     fn turn(&mut self, daq: &[u8], out: &mut Outbox, notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>)) {
         if self.failure.is_some() {
