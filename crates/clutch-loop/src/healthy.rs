@@ -2,6 +2,7 @@
 //! Nothing is broken, so that the supervisor's envelope may end none of them.
 
 use crate::campaign::CampaignError;
+use crate::campaign::laws::SOFT_PID;
 use crate::faults::{Direction, Fault, FaultKind};
 use crate::from_scenario::{self, BuiltRun};
 use crate::station::ControllerStation;
@@ -51,7 +52,7 @@ impl Healthy {
         let law = ["pd", "ctc", "smc", "smc", "pid", "glide"][rng.random_range(0..6)];
         let delay = rng.random_range(0..=1);
         let law = match law {
-            "pid" => "[law.pid]\nkp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            "pid" => format!("[law.pid]\n{SOFT_PID}"),
             "glide" => {
                 let steps = if rng.random_bool(0.5) { 0.95 } else { 0.0 };
                 format!("[law.glide]\nmicro_below_deg_s = {steps:?}\nfilter.delay_ticks = {delay}\n")

@@ -136,6 +136,7 @@ impl<'a> Common<'a> {
             slow_si,
             sliding,
             rest,
+            // A little wider than need be, as the search has it: its multipliers are for these.
             fast: (
                 sliding.0 + left * (rest.0 - sliding.0).min(at(0.0)),
                 sliding.1 + left * (rest.1 - sliding.0).positive(),

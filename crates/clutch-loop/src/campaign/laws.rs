@@ -38,6 +38,9 @@ pub(super) struct OfLaw {
     pub(super) switches: bool,
 }
 
+/// Keys of PID on the paper's rig.
+pub(crate) const SOFT_PID: &str = "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n";
+
 /// The promises of all.
 const ALL: OfLaw = OfLaw {
     brake: |_| String::new(),
@@ -109,8 +112,7 @@ pub(super) fn of(law: &str) -> OfLaw {
             brake: |s| {
                 // The bench's friction rises and falls along the disc.
                 let stiff = "kp_v_rad = 600.0\nki_v_rad_s = 3000.0\nkd_v_s_rad = 8.0\n";
-                let soft = "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n";
-                if s.rig == RigName::Bench { stiff } else { soft }.to_owned()
+                if s.rig == RigName::Bench { stiff } else { SOFT_PID }.to_owned()
             },
             motor: "kp_v_rad = 200.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 4.0\n",
             // It creeps ahead at a slow start on an uneven disc, and waits with the whole brake for its path.

@@ -6,7 +6,7 @@
 
 pub mod grammar;
 mod healthy_run;
-mod laws;
+pub(crate) mod laws;
 pub mod oracle;
 pub mod table;
 

@@ -248,13 +248,12 @@ fn unknown_key(
     let former = MOVED.iter().find(|(old, _)| *old == whole);
     let gone = GONE.contains(&whole.as_str()).then(|| ": it is gone, leave it out".to_owned());
     let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(gone).or(moved);
-    let unposed =
-        (whole.starts_with("rig.") || whole.starts_with("model.")).then(|| asks(&whole, unknown)).flatten();
-    if let (None, Some(what)) = (&moved, unposed) {
-        let message = format!("unknown key: it asks for {what} (docs/systems.md)");
-        return ScenarioError::new(origin, &whole, &value.map(shown).unwrap_or_default(), message);
-    }
-    let hint = moved.unwrap_or_else(|| correction(unknown, value, &names));
+    let of_a_rig = ["rig", "model"].contains(&path.split('.').next().unwrap_or(""));
+    let unposed = || {
+        let asked = if of_a_rig { asks(&whole, unknown) } else { None };
+        asked.map(|what| format!(": it asks for {what} (docs/systems.md)"))
+    };
+    let hint = moved.or_else(unposed).unwrap_or_else(|| correction(unknown, value, &names));
     let shown = value.filter(|v| !v.is_table()).map(shown).unwrap_or_default();
     let message = format!("unknown key{}", expected(&hint, &names));
     ScenarioError::new(origin, &whole, &shown, message)
