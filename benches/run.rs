@@ -1,7 +1,7 @@
 //! Ten simulated seconds on each rig, and engine against engine on the same run.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use clutch_core::law::{LawParams, PdParams, SmcParams};
+use clutch_core::law::{LawParams, PdParams};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Friction, FrictionModel, Plant, PlantParams, StribeckParams};
 use clutch_sim::drive::{Drive, DriveParams, SineDrive};
@@ -10,7 +10,7 @@ use clutch_sim::progress::UNWATCHED;
 use clutch_sim::rig::RigBase;
 use clutch_sim::scenario::Value;
 use clutch_sim::sweep::Sweep;
-use clutch_sim::system::{Motion, State, System};
+use clutch_sim::system::{Motion, System, SystemState};
 use clutch_sim::{Keep, RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{SMatrix, SVector};
@@ -28,12 +28,11 @@ fn rigs(c: &mut Criterion) {
     for base in RigBase::ALL {
         let name = base.name();
         let rig = RigParams::named(*base);
-        for (law_name, law) in
-            [("pd", LawParams::Pd(PdParams::default())), ("smc", LawParams::Smc(SmcParams::default()))]
-        {
+        for law in ["pd", "ctc", "smc", "pid"] {
+            let params = LawParams::named(law).expect("a law of the list");
             for rate in [20.0, 2.0] {
-                let spec = ten_seconds(rig.clone(), law, rate);
-                group.bench_function(format!("{name}/{law_name}_{rate}_deg_s"), |b| {
+                let spec = ten_seconds(rig.clone(), params, rate);
+                group.bench_function(format!("{name}/{law}_{rate}_deg_s"), |b| {
                     b.iter(|| simulate::<f64>(&spec).expect("runs"));
                 });
             }
@@ -88,7 +87,7 @@ fn systems(c: &mut Criterion) {
     let system = Shaft(Friction::build(&params.into()).expect("in range"));
     group.bench_function("system", |b| {
         b.iter(|| {
-            let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+            let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
             let mut motion = Motion::new(&system, begin).expect("a system");
             motion.advance(1.0, &mut Vec::new()).expect("it can be followed");
             motion.state().position

@@ -309,7 +309,7 @@ class Board:
 def trial(clutch, lie, seed):
     """A run of `clutch loop` on a board that tells this lie."""
     draw = random.Random(seed * 7919 + 1)
-    law, hold = draw.choice(["pd", "ctc", "smc"]), draw.choice([6.7, 9.99])
+    law, hold = draw.choice(["pd", "ctc", "smc", "pid"]), draw.choice([6.7, 9.99])
     with tempfile.TemporaryDirectory() as folder:
         scenario, port = Path(folder, "lies.toml"), Path(folder, "port")
         scenario.write_text(SCENARIO.format(law=law, rate=RATE_DEG_S, hold=hold), encoding="utf-8")

@@ -180,19 +180,31 @@ def advance(plant, brake, t0, state, period=PERIOD):
 # --- The laws ----------------------------------------------------------------------------------
 
 
+class Law:
+    """A law with a memory, ``None`` unless it says otherwise."""
+
+    def start(self, e, rate, target_velocity, applied):
+        """The memory before the first tick; ``applied`` is the voltage that the brake has."""
+        return
+
+    def after(self, memory, e, demand, volts):
+        """The memory after a tick that demanded one voltage and gave another."""
+        return memory
+
+
 @dataclass(frozen=True)
-class Pd:
+class Pd(Law):
     """(4), with a brake's sign."""
 
     kp: float = 5000.0
     kd: float = 50.0
 
-    def demand(self, e, rate, target_velocity):
+    def demand(self, e, rate, target_velocity, memory=None):
         return -(self.kp * e + self.kd * rate)
 
 
 @dataclass(frozen=True)
-class Smc:
+class Smc(Law):
     """(31)."""
 
     kp: float = 3.0
@@ -200,7 +212,7 @@ class Smc:
     slope: float = 70.0
     boundary: float = 0.1
 
-    def demand(self, e, rate, target_velocity):
+    def demand(self, e, rate, target_velocity, memory=None):
         surface = self.slope * e + rate
 
         def sat(x):
@@ -210,7 +222,7 @@ class Smc:
 
 
 @dataclass(frozen=True)
-class Ctc:
+class Ctc(Law):
     """(11) on a path without acceleration, believing in a plant."""
 
     model: Plant = Plant()
@@ -218,11 +230,38 @@ class Ctc:
     kp: float = 100.0
     kd: float = 0.7
 
-    def demand(self, e, rate, target_velocity):
+    def demand(self, e, rate, target_velocity, memory=None):
         m, velocity = self.model, target_velocity - rate
         tau = -self.outer * (self.kp * e + self.kd * rate)
         friction = m.drive.torque(0.0, 0.0) + m.inertia * tau - m.damping * velocity
         return friction / (m.mu(abs(velocity)) * m.gain)
+
+
+@dataclass(frozen=True)
+class Pid(Law):
+    """Textbook PID whose integral is taken back by what a limit cuts off (Åström and Hägglund 2006).
+
+    The memory is the integral part of the voltage, ``-K_i ∫ e dt`` summed by rectangles.
+    """
+
+    kp: float = 1000.0
+    ki: float = 10_000.0
+    kd: float = 20.0
+    tracking: float = 0.05
+    lowest: float = 0.0
+    highest: float = 10.0
+
+    def start(self, e, rate, target_velocity, applied):
+        # The first tick, which adds a rectangle of its own, demands what the brake has.
+        return applied + self.kp * e + self.kd * rate + self.ki * PERIOD * e
+
+    def demand(self, e, rate, target_velocity, memory=None):
+        return memory - self.ki * PERIOD * e - self.kp * e - self.kd * rate
+
+    def after(self, memory, e, demand, volts):
+        cut_off = volts - demand if volts <= self.lowest or volts >= self.highest else 0.0
+        integral = memory - self.ki * PERIOD * e + PERIOD / self.tracking * cut_off
+        return min(max(integral, self.lowest), self.highest)
 
 
 # --- Sensor and converter ----------------------------------------------------------------------
@@ -284,7 +323,7 @@ class Loop:
         # Held at rest: a quarter above the static limit, which is the sliding voltage at rest.
         actual = (1.25 if self.at_rest else 1.0) * plant.sliding_voltage(velocity)
         waiting = deque([actual] * self.delay)
-        rate, last = 0.0, None
+        rate, last, memory = 0.0, None, None
         rows, events = [], []
         for k, (goal, speed) in enumerate(zip(target, target_velocity, strict=True)):
             position = state[0]
@@ -292,8 +331,12 @@ class Loop:
             e = goal - (self.encoder.angle(counts) if self.encoder else position)
             difference = 0.0 if last is None else (e - last) / PERIOD
             rate = (1.0 - self.smoothing) * rate + self.smoothing * difference  # (5)
+            if last is None:
+                memory = law.start(e, rate, speed, actual)
             last = e
-            volts = min(max(law.demand(e, rate, speed), self.lowest), self.highest)
+            demand = law.demand(e, rate, speed, memory)
+            volts = min(max(demand, self.lowest), self.highest)
+            memory = law.after(memory, e, demand, volts)
             code = dac.code(volts) if dac else 0
             volts = dac.volts(code) if dac else volts
             rows.append((k * PERIOD, position, state[1], state[2] == 0, counts, e, rate, code, volts))

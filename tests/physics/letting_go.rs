@@ -5,7 +5,7 @@ use crate::linear::Linear;
 use clutch_core::Friction;
 use clutch_core::friction::{CoulombParams, FrictionModel};
 use clutch_sim::referee::{Case, RefereeEngine, run};
-use clutch_sim::system::{Mode, Motion, State, System, SystemEvent};
+use clutch_sim::system::{Mode, Motion, System, SystemEvent, SystemState};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::{PI, TAU};
 
@@ -252,7 +252,8 @@ impl Untold {
     }
 
     fn events(&self, velocity: f64, until: f64) -> Vec<(f64, Mode)> {
-        let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::from([velocity]) };
+        let begin =
+            SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::from([velocity]) };
         let (mut motion, mut events) = (Motion::new(self, begin).unwrap(), Vec::new());
         motion.advance(until, &mut events).unwrap();
         events.iter().map(|e| (e.time, e.mode)).collect()
@@ -350,7 +351,7 @@ fn random_systems_let_go_and_stop_at_the_same_instants_in_steps_of_a_hundredth()
         system.base[1] = system.base[0];
         let events = |longest: f64| {
             let system = InSteps(&system, longest);
-            let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+            let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
             let (mut motion, mut events) = (Motion::new(&system, begin).unwrap(), Vec::new());
             motion.advance(2.0, &mut events).unwrap();
             events

@@ -5,7 +5,7 @@ use crate::parts::Interval;
 use clutch_core::Friction;
 use clutch_core::friction::{FrictionParams, StribeckParams};
 use clutch_sim::engine::{DormandPrince, Engine, EventKind, ExactFlow};
-use clutch_sim::system::{Mode, Motion, State, System};
+use clutch_sim::system::{Mode, Motion, System, SystemState};
 use nalgebra::{SMatrix, SVector};
 
 /// An interval of a shaft, written as a system.
@@ -36,9 +36,9 @@ impl System<1, 1> for OneRow<'_> {
 
 impl OneRow<'_> {
     /// Its end, and the instants at which it began to rest, or no longer to rest.
-    fn end(&self) -> (State<1>, Vec<(f64, bool)>) {
+    fn end(&self) -> (SystemState<1>, Vec<(f64, bool)>) {
         let begin =
-            State { time: 0.0, position: SVector::zeros(), velocity: SVector::from([self.0.velocity]) };
+            SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::from([self.0.velocity]) };
         let (mut motion, mut events) = (Motion::new(self, begin).unwrap(), Vec::new());
         let mut rests = motion.modes()[0] == Mode::Stuck;
         motion.advance(self.0.seconds, &mut events).unwrap();

@@ -7,7 +7,7 @@ use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::{Drive, DriveParams, Side, WeightDrive};
 use clutch_sim::engine::{Bristle, DormandPrince, Engine, Event, ExactFlow, Input, Model, Shaft, Volts};
 use clutch_sim::ripple::Ripple;
-use clutch_sim::system::{BristledMotion, Motion, State};
+use clutch_sim::system::{BristledMotion, Motion, SystemState};
 use nalgebra::SVector;
 
 /// A shaft, what drives it, and its voltage over an interval.
@@ -165,7 +165,7 @@ fn intervals_of_bristles_in_parts_are_the_intervals_whole() {
 fn of_systems<const N: usize, const B: usize>(draw: &mut Draw) -> f64 {
     let system = Linear::<N, B>::draw(draw, Draw::friction);
     let velocity = SVector::from_fn(|_, _| draw.between(-1.0, 1.0));
-    let begin = State { time: 0.0, position: SVector::zeros(), velocity };
+    let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity };
     let seconds = draw.log(0.01, 1.0);
     let parts = 2 + draw.whole(18) as u32;
     let [a, b] = [1, parts].map(|parts| {
@@ -184,7 +184,7 @@ macro_rules! of_bristled {
         |draw: &mut Draw| {
             let system = Linear::<$joints, $rows>::draw(draw, Draw::of_one_bristle);
             let velocity = SVector::from_fn(|_, _| draw.between(-1.0, 1.0));
-            let begin = State { time: 0.0, position: SVector::zeros(), velocity };
+            let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity };
             let seconds = draw.log(0.01, 0.3);
             let parts = 2 + draw.whole(18) as u32;
             let [a, b] = [1, parts].map(|parts| {

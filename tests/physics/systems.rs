@@ -5,7 +5,7 @@ use crate::draw::Draw;
 use crate::linear::Linear;
 use clutch_core::friction::{FrictionParams, StribeckParams};
 use clutch_core::{Friction, FrictionModel};
-use clutch_sim::system::{BristledMotion, Motion, State, System, SystemError, hold};
+use clutch_sim::system::{BristledMotion, Motion, System, SystemError, SystemState, hold};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 fn friction(p: impl Into<FrictionParams>) -> Friction<f64> {
@@ -40,7 +40,7 @@ fn a_system_of_one_inertia_and_one_row_is_the_shaft() {
     use clutch_sim::engine::{DormandPrince, Engine, Input, Model, Volts};
     let params = StribeckParams { stribeck_velocity: 0.01, ..StribeckParams::default() };
     let system = Shaft(friction(params));
-    let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+    let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
     let (mut motion, mut events) = (Motion::new(&system, begin).unwrap(), Vec::new());
     motion.advance(1.0, &mut events).unwrap();
 
@@ -71,7 +71,7 @@ fn a_system_of_one_inertia_and_one_row_is_the_shaft() {
 #[test]
 fn a_motion_is_given_up_after_the_steps_that_it_is_allowed_and_each_call_has_them_anew() {
     let system = Shaft(friction(StribeckParams::default()));
-    let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+    let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
     let moved = |steps: u32, calls: u32| {
         let (mut motion, mut events) = (Motion::new(&system, begin).unwrap().with_limit(steps), Vec::new());
         let done = (1..=calls).try_for_each(|k| motion.advance(f64::from(k) / f64::from(calls), &mut events));
@@ -148,12 +148,12 @@ fn systems_of_springs_and_friction_never_gain_energy() {
             SVector::from_fn(|_, _| draw.between(-1.0, 1.0)),
             SVector::from_fn(|_, _| draw.between(-1.0, 1.0)),
         );
-        let mut motion = Motion::new(&system, State { time: 0.0, position, velocity }).unwrap();
+        let mut motion = Motion::new(&system, SystemState { time: 0.0, position, velocity }).unwrap();
         let begin = system.energy(&position, &velocity);
         let (mut energy, mut events) = (begin, Vec::new());
         for k in 1..=500 {
             motion.advance(f64::from(k) * 1e-2, &mut events).unwrap();
-            let State { position, velocity, .. } = motion.state();
+            let SystemState { position, velocity, .. } = motion.state();
             let now = system.energy(position, velocity);
             assert!(now <= energy + 1e-10 * begin, "{n} at {k}: {now} J after {energy} J");
             energy = now;
@@ -176,12 +176,12 @@ fn systems_with_bristles_never_gain_energy() {
             system.damping += row * row.transpose() * (bristles.passive_from() * system.normal[i]);
         }
         let velocity = SVector::from_fn(|_, _| draw.between(-1.0, 1.0));
-        let begin = State { time: 0.0, position: SVector::zeros(), velocity };
+        let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity };
         let first = system.energy(&begin.position, &velocity);
         let mut motion = BristledMotion::<_, 2, 2, 6>::new(&system, begin).unwrap();
         for k in 1..=100 {
             motion.advance(f64::from(k) * 1e-2).unwrap();
-            let State { position, velocity, .. } = motion.state();
+            let SystemState { position, velocity, .. } = motion.state();
             let now = system.energy(&position, &velocity);
             assert!(now <= first * (1.0 + 1e-9), "{n} at {k}: {now} J of {first} J");
         }

@@ -10,6 +10,7 @@ use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
+use clutch_loop::cause_words::cause_text;
 use clutch_loop::chip_board::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession};
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
@@ -18,7 +19,6 @@ use clutch_loop::onlooker::Looking;
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
 use clutch_loop::virtual_time::VirtualReport as Ran;
-use clutch_loop::words::cause_text;
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 

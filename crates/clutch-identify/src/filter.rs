@@ -10,7 +10,7 @@
 use nalgebra::{SMatrix, SVector};
 
 /// Position, velocity, mean friction, ripple, its slope.
-pub type State = SVector<f64, 5>;
+pub type FilterState = SVector<f64, 5>;
 /// Their covariance.
 pub type Spread = SMatrix<f64, 5, 5>;
 
@@ -40,7 +40,7 @@ const FAR: f64 = 5.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Belief {
     /// Means.
-    pub mean: State,
+    pub mean: FilterState,
     /// Covariance.
     pub spread: Spread,
 }
@@ -58,9 +58,9 @@ impl Belief {
     /// A shaft at a position with a velocity, where the ripple may be anything.
     #[must_use]
     pub fn new(shaft: &Shaft, position: f64, velocity: (f64, f64), friction: (f64, f64)) -> Belief {
-        let mean = State::new(position, velocity.0, friction.0, 0.0, 0.0);
+        let mean = FilterState::new(position, velocity.0, friction.0, 0.0, 0.0);
         let slope = shaft.wave * shaft.ripple;
-        let deviations = State::new(0.3, velocity.1, friction.1, shaft.ripple, slope);
+        let deviations = FilterState::new(0.3, velocity.1, friction.1, shaft.ripple, slope);
         Belief { mean, spread: Spread::from_diagonal(&deviations.component_mul(&deviations)) }
     }
 
@@ -76,7 +76,7 @@ impl Belief {
         // way it would be taken for a measurement of them. A ride goes one way.
         let turned = way.max(0.0);
         let next = slope - turned * (k2 * ripple + decay * slope);
-        self.mean = State::new(position + way, velocity + a * dt, mean, ripple + turned * next, next);
+        self.mean = FilterState::new(position + way, velocity + a * dt, mean, ripple + turned * next, next);
         let by_friction = -0.5 * load * dt * dt;
         let mut f = Spread::identity();
         f[(0, 1)] = dt - 0.5 * shaft.damping * dt * dt;

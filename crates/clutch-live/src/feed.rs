@@ -7,8 +7,8 @@ use clutch_log::{
     ChangeRecord, CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record,
     SampleRecord, names,
 };
+use clutch_loop::cause_words::cause_text;
 use clutch_loop::live_gains::LiveGains;
-use clutch_loop::words::cause_text;
 use clutch_sim::detected::Detector;
 use clutch_sim::{Keep, Scenario, number};
 use rtrb::Consumer;

@@ -10,7 +10,7 @@ use clutch_core::{Bounds, Interval, Plant, Real};
 use clutch_loop::drift::{Alarm, Drift, DriftReport};
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_loop::healthy::Healthy;
+use clutch_loop::healthy::HealthyShaft;
 use clutch_loop::station::ControllerStation;
 use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
 use clutch_node::ControllerNode;
@@ -223,8 +223,8 @@ struct Group {
 /// the least is an alarm.
 fn healthy(drawn: u64) -> Outcome<()> {
     let mut groups = vec![Group {
-        name: "drawn from ±40 % of friction, half to twice the load, PD, CTC, SMC, PID and glide on all kinds of paths".to_owned(),
-        runs: (1..=drawn).map(|seed| Healthy { seed, seconds: 60 }.scenario()).collect::<Result<_, _>>()?,
+        name: "drawn from ±40 % of friction, half to twice the load, every law of the list that follows a path, on all kinds of paths".to_owned(),
+        runs: (1..=drawn).map(|seed| HealthyShaft { seed, seconds: 60 }.scenario()).collect::<Result<_, _>>()?,
     }];
     for (name, law) in LAWS {
         let mut runs = Vec::new();

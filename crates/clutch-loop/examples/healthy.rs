@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p clutch-loop --example healthy -- [HOURS [FIRST_SEED]]`
 
-use clutch_loop::healthy::{ENVELOPE, Healthy};
+use clutch_loop::healthy::{ENVELOPE, HealthyShaft};
 use std::collections::BTreeMap;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ends = BTreeMap::<String, u64>::new();
     // Periods of 1 ms in which control was on.
     while (periods as f64) < hours * 3.6e6 {
-        let run = Healthy { seed: first + runs, seconds: 20 };
+        let run = HealthyShaft { seed: first + runs, seconds: 20 };
         let report = run.run()?;
         periods += report.answers;
         runs += 1;

@@ -536,7 +536,9 @@ impl Drift {
             // At rest it carries up to its level there; and what slides meets no more than the hardest grip.
             let most = (friction.at_rest() / mu * of_model).min(mu * acted.hardest * time);
             sums.more_at_rest = (most - of_model).max(0.0);
-            sums.released = of_model * acted.lets_go[usize::from(moved < 0)].max(0.0);
+            // Without a grip all the way nothing stuck, and nothing was let go.
+            let lets_go = acted.lets_go[usize::from(moved < 0)].max(0.0);
+            sums.released = if of_model > 0.0 { of_model * lets_go } else { 0.0 };
         }
         sums
     }

@@ -12,7 +12,7 @@
 //! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
 //! | `release` | the test of encoder and brake that comes before a run |
 //! | `control_loop` | the run on its control thread |
-//! | `clearance`, `words` | whether a scenario may run on a board; refusals and causes in words |
+//! | `clearance`, `cause_words` | whether a scenario may run on a board; refusals and causes in words |
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `onlooker`, `live_gains`, `tuning` | one that looks on while a run goes; gains that are changed meanwhile |
@@ -33,6 +33,7 @@ pub mod board_clock;
 mod board_words;
 pub mod build_error;
 pub mod campaign;
+pub mod cause_words;
 #[cfg(target_os = "linux")]
 pub mod chip_board;
 pub mod clearance;
@@ -76,4 +77,3 @@ pub mod to_log;
 mod tuning;
 pub mod virtual_time;
 pub mod watch;
-pub mod words;

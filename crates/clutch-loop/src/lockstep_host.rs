@@ -95,8 +95,10 @@ impl<L: LockstepBoard, P: Planned<f32>> LockstepHost<L, P> {
             }
         });
         if let Some(m) = refused {
-            self.failure =
-                Some(format!("the board refused to {what}: {}", crate::words::why(&m, Some(&self.settings))));
+            self.failure = Some(format!(
+                "the board refused to {what}: {}",
+                crate::cause_words::why(&m, Some(&self.settings))
+            ));
         }
     }
 
@@ -113,7 +115,7 @@ impl<L: LockstepBoard, P: Planned<f32>> LockstepHost<L, P> {
                 _ => {}
             });
             if !taken && self.failure.is_none() {
-                let why = |m: &Refused| crate::words::why(m, Some(&self.settings));
+                let why = |m: &Refused| crate::cause_words::why(m, Some(&self.settings));
                 let why = refused.as_ref().map_or("it did not answer".to_owned(), why);
                 self.failure = Some(format!("the board did not take the setting {key:#06x}: {why}"));
             }

@@ -2,10 +2,10 @@
 
 use crate::board_clock::{BoardClock, Look, Wrong};
 use crate::build_error::BuildError;
+use crate::cause_words::why;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};
-use crate::words::why;
 use clutch_core::Micros;
 use clutch_node::{Notice, Outbox};
 use clutch_settings::Settings;

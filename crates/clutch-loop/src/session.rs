@@ -7,6 +7,7 @@
 use crate::board_words::{board_text, controller_text, is_simulated, start_notes, started_text};
 use crate::build_error::BuildError;
 use crate::campaign::CampaignError;
+use crate::cause_words::cause_text;
 use crate::clearance::{ClearanceError, Cleared, check};
 use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift, Pace};
 use crate::drift::DriftReport;
@@ -26,7 +27,6 @@ use crate::summary::{LogSummary, SampledSummary, Summary};
 use crate::to_log::PRESENT_CODE;
 use crate::tuning::Tuning;
 use crate::watch::Watch;
-use crate::words::cause_text;
 use clutch_core::law::Law;
 use clutch_core::supervisor::Cause;
 use clutch_core::{

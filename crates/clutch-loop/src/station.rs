@@ -3,7 +3,7 @@
 //! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
 //! which of the two it is.
 
-use crate::words::why;
+use crate::cause_words::why;
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real, Servo};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};

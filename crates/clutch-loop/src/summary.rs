@@ -1,10 +1,10 @@
 //! The summary of a session: its figures, and what ended it in words.
 
+use crate::cause_words::{cause_text, why};
 use crate::clearance::Cleared;
 use crate::control_loop::LoopReport;
 use crate::realtime::CycleSummary;
 use crate::sim_board_server::ServeReport;
-use crate::words::{cause_text, why};
 use clutch_core::supervisor::{Cause, State};
 use clutch_sim::number;
 use serde_json::{Value, json};

@@ -3,6 +3,7 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
+use crate::cause_words::why;
 #[cfg(target_os = "linux")]
 use crate::chip_board::ChipError;
 use crate::faults::{Direction, Fault};
@@ -11,7 +12,6 @@ use crate::onlooker::Played;
 use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
-use crate::words::why;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Planned, Real};
 use clutch_log::{CommandRecord, Record, SampleRecord};

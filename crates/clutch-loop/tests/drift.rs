@@ -1,13 +1,17 @@
 //! The watch over friction and load: what leaves the bounds is reported on its side and in time, what does not leave them is not.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use clutch_core::{Bounds, Interval};
+use clutch_core::friction::FrictionModel;
+use clutch_core::law::LawParams;
+use clutch_core::{Bounds, Interval, Plant};
 use clutch_loop::drift::{Alarm, Drift, DriftReport};
 use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::healthy::HealthyShaft;
 use clutch_loop::station::ControllerStation;
 use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
 use clutch_node::ControllerNode;
 use clutch_sim::detected::Detector;
+use clutch_sim::rig::Rig;
 use clutch_sim::scenario::BUILT_IN;
 use clutch_sim::{Keep, Scenario};
 
@@ -150,6 +154,36 @@ fn shafts_that_stick_lose_samples_or_start_from_rest_are_no_drift() {
     let (alarms, report) = run(&built_in("board_minimum_jerk", &[]), &[]);
     assert!(alarms.is_empty() && report.windows > 20, "{alarms:?} {report:?}");
     assert!(report.words().contains("; bounds 1 to 1, not left"), "{}", report.words());
+}
+
+/// The sign function lets go of the pad for whole gaps, in which there is no friction.
+#[test]
+fn gaps_without_a_grip_leave_the_truth_within_the_interval() {
+    let point = |x: f64| Interval { low: x, high: x };
+    let (mut windows, mut one_sided) = (0, 0);
+    for seed in [8, 30, 48, 56] {
+        let scenario = HealthyShaft { seed, seconds: 60 }.scenario().unwrap();
+        let spec = scenario.spec();
+        assert!(matches!(spec.law, LawParams::SmcSign(_)), "{:?}", spec.law);
+        let rig = Rig::new(&spec.rig, spec.run.seed).unwrap();
+        let (plant, model) = (&rig.model.plant, Plant::new(&spec.model).unwrap());
+        let more = plant.friction().sliding() / model.friction().sliding();
+        let truth = Bounds {
+            inertia: point(plant.params().inertia),
+            drive_torque: point(rig.drive.range().0),
+            viscous_damping: point(plant.params().viscous_damping),
+            brake_gain: point(plant.actuator().brake_gain() * more),
+            ..scenario.plan().unwrap().bounds
+        };
+        // What `[bounds]` says of friction is in the gain.
+        let exact = ("bounds.friction_percent".to_owned(), "0.0".to_owned());
+        let scenario = Scenario::parse("exact", &scenario.canonical(), &[exact]).unwrap();
+        let (alarms, report) = watched(&scenario, &truth, &[]);
+        assert!(alarms.is_empty(), "seed {seed}: {alarms:?}");
+        windows += report.windows;
+        one_sided += report.one_sided;
+    }
+    assert!(windows > 400 && one_sided > windows / 2, "{one_sided} of {windows} windows");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use clutch_core::{
 };
 use clutch_sim::drive::{Drive, DriveParams, SineDrive};
 use clutch_sim::engine::{DormandPrince, Engine, EngineKind, Input, Model, Shaft, Volts};
-use clutch_sim::system::{Motion, State, System};
+use clutch_sim::system::{Motion, System, SystemState};
 use clutch_sim::{RigParams, RunSpec};
 use clutch_wire::{Actuate, Decoder, Message, Sample, encode};
 use nalgebra::{SMatrix, SVector};
@@ -204,7 +204,7 @@ fn shaft(which: &str) -> Result<bool, Box<dyn Error>> {
         }
         "by_system" => {
             let system = OneRow { plant, drive };
-            let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+            let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
             let mut motion = Motion::new(&system, begin)?;
             let mut done = Ok(());
             counted(|k| {

@@ -11,7 +11,7 @@ use clutch_core::{
 };
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{Bristle, DormandPrince, Engine, EventKind, ExactFlow, Input, Model, Shaft, Volts};
-use clutch_sim::system::{Mode, Motion, State, System};
+use clutch_sim::system::{Mode, Motion, System, SystemState};
 use nalgebra::{SMatrix, SVector};
 use std::io::{BufRead, Write};
 
@@ -61,7 +61,7 @@ fn by_system(
     seconds: f64,
 ) -> Result<Moved, Box<dyn std::error::Error>> {
     let system = One { pushed, friction: Friction::build(friction)? };
-    let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::from([velocity]) };
+    let begin = SystemState { time: 0.0, position: SVector::zeros(), velocity: SVector::from([velocity]) };
     let (mut motion, mut events) = (Motion::new(&system, begin)?.with_limit(STEPS), Vec::new());
     let breaks_away = velocity == 0.0 && motion.modes()[0] != Mode::Stuck;
     motion.advance(seconds, &mut events)?;

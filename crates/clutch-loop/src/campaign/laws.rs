@@ -2,14 +2,16 @@
 //!
 //! A law of the list that has no row is drawn all the same, with its own gains, and held to the promises of all.
 
-use super::healthy_run::{HealthyRun, RigName};
+use super::healthy_run::RigName;
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 
 /// Differences of a law from others.
-pub(super) struct OfLaw {
-    /// Its keys on a brake.
-    pub(super) brake: fn(&HealthyRun) -> String,
+pub(crate) struct OfLaw {
+    /// Its keys on a brake: of a rig, with micro-steps or without, for a delay in periods.
+    pub(crate) brake: fn(RigName, bool, u32) -> String,
+    /// Its keys with which it holds the heaviest shaft with the weakest brake of wide bounds.
+    pub(crate) holds_all: &'static str,
     /// Its keys on a motor axis.
     pub(super) motor: &'static str,
     /// True if it bears a period of delay on the paper's rig: under PD that is unstable, and laws that switch swing.
@@ -35,15 +37,20 @@ pub(super) struct OfLaw {
     /// Time in which a shaft that no longer shows its way ends control, s.
     pub(super) found_s: f64,
     /// True if it switches between the limits of the output, and so leaves a brake open until the shaft has caught up.
-    pub(super) switches: bool,
+    pub(crate) switches: bool,
 }
 
-/// Keys of PID on the paper's rig.
-pub(crate) const SOFT_PID: &str = "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n";
+/// The rate below which glide takes micro-steps.
+const MICRO: &str = "micro_below_deg_s = 0.95\n";
+
+/// A switching gain that holds the heaviest shaft with the weakest brake of the healthy shafts' bounds. With less the law lets
+/// such a shaft creep ahead of its path, and nothing is healthy any more: the 3 V of Table 2 are for the paper's load.
+const SWITCHED: &str = "kp_v = 9.0\n";
 
 /// The promises of all.
 const ALL: OfLaw = OfLaw {
-    brake: |_| String::new(),
+    brake: |_, _, _| String::new(),
+    holds_all: "",
     motor: "",
     bears_delay: false,
     saturated_s: 0.2,
@@ -68,11 +75,16 @@ pub(super) const fn drawn(rig: RigName) -> &'static [&'static str] {
     }
 }
 
-/// The laws of the list that follow a path and are not drawn first on any rig.
+/// The laws of the list that follow a path.
+pub(crate) fn following() -> Vec<&'static str> {
+    let follows = LawParams::<f64>::all().into_iter().filter(LawParams::follows);
+    follows.map(|law| Choice::<f64>::name(&law)).collect()
+}
+
+/// Those that are not drawn first on any rig.
 pub(super) fn drawn_later() -> Vec<&'static str> {
     let first = |law: &&str| RigName::ALL.into_iter().any(|rig| drawn(rig).contains(law));
-    let follows = LawParams::<f64>::all().into_iter().filter(LawParams::follows);
-    follows.map(|law| Choice::<f64>::name(&law)).filter(|law| !first(law)).collect()
+    following().into_iter().filter(|law| !first(law)).collect()
 }
 
 /// The steady laws, as often as they are drawn where samples are lost.
@@ -88,7 +100,7 @@ pub(super) const LED: &str = "smc";
 pub(super) const TO_ITS_LIMIT: &str = "pd";
 
 /// Knowledge of the law of a name.
-pub(super) fn of(law: &str) -> OfLaw {
+pub(crate) fn of(law: &str) -> OfLaw {
     match law {
         // It swings: dead reckoning from its last period is off by more.
         "pd" => OfLaw { steady: Some(8), ..ALL },
@@ -100,19 +112,24 @@ pub(super) fn of(law: &str) -> OfLaw {
             ..ALL
         },
         "smc" => OfLaw {
+            holds_all: SWITCHED,
             motor: "kp_v = 1.5\nkd_v_s_rad = 4.0\nslope_1_s = 40.0\nboundary_rad_s = 0.3\n",
             bears_delay: true,
             steady: Some(LONGEST_GAP),
             ..ALL
         },
         // At one limit or the other in every period.
-        "smc_sign" => OfLaw { saturated_s: 5.0, switches: true, ..ALL },
+        "smc_sign" => OfLaw { holds_all: SWITCHED, saturated_s: 5.0, switches: true, ..ALL },
+        "smc_integral" => OfLaw { holds_all: SWITCHED, ..ALL },
         // Slow to let go at the start. Its error is in degrees, and its voltage as far off.
         "pid" => OfLaw {
-            brake: |s| {
-                // The bench's friction rises and falls along the disc.
-                let stiff = "kp_v_rad = 600.0\nki_v_rad_s = 3000.0\nkd_v_s_rad = 8.0\n";
-                if s.rig == RigName::Bench { stiff } else { SOFT_PID }.to_owned()
+            brake: |rig, _, _| {
+                let keys = match rig {
+                    // Its friction rises and falls along the disc.
+                    RigName::Bench => "kp_v_rad = 600.0\nki_v_rad_s = 3000.0\nkd_v_s_rad = 8.0\n",
+                    _ => "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n",
+                };
+                keys.to_owned()
             },
             motor: "kp_v_rad = 200.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 4.0\n",
             // It creeps ahead at a slow start on an uneven disc, and waits with the whole brake for its path.
@@ -125,21 +142,23 @@ pub(super) fn of(law: &str) -> OfLaw {
             ..ALL
         },
         // At rest under a safe state its integral is at most of the output, and has to let go in time.
-        "super_twisting" => {
-            OfLaw { brake: |_| "k2_v_s = 42.0\n".to_owned(), following_deg: 4.0, healthy_deg: 2.5, ..ALL }
-        }
+        "super_twisting" => OfLaw {
+            brake: |_, _, _| "k2_v_s = 42.0\n".to_owned(),
+            following_deg: 4.0,
+            healthy_deg: 2.5,
+            ..ALL
+        },
         // It takes a shaft at rest for one that slides, and brakes with all it has until a slow path has come.
         "dob" => OfLaw { saturated_s: 1.0, ..ALL },
         // It waits for the edges of a slow shaft, and for that of a first start; after silence and two starts of 25 ms that
         // brought no edge it lets go for good.
         "glide" => OfLaw {
-            // In one scalar with micro-steps, in the other without.
-            brake: |s| {
-                let micro = if s.single { "micro_below_deg_s = 0.95\n" } else { "" };
-                format!("{micro}filter.delay_ticks = {}\n", s.delay)
+            brake: |_, micro, delay| {
+                let micro = if micro { MICRO } else { "" };
+                format!("{micro}filter.delay_ticks = {delay}\n")
             },
             // Without them a motor under it stands at each reversal.
-            motor: "micro_below_deg_s = 0.95\n",
+            motor: MICRO,
             bears_delay: true,
             starts_late: true,
             silence_s: 0.08,

@@ -5,7 +5,7 @@
 //! first seeds, and show that it fails when any one of the supervisor's checks is taken out.
 
 pub mod grammar;
-mod healthy_run;
+pub(crate) mod healthy_run;
 pub(crate) mod laws;
 pub mod oracle;
 pub mod table;
@@ -171,7 +171,8 @@ impl Draw {
                  [output]\nhighest_v = 3.0\non_invalid_v = 3.0\n"
             );
         }
-        let gains = (laws::of(s.law).brake)(s);
+        // In one scalar with micro-steps, in the other without.
+        let gains = (laws::of(s.law).brake)(s.rig, s.single, s.delay);
         let _ = writeln!(text, "[law.{}]\n{gains}", s.law);
         let _ = match s.path {
             PathKind::Ramp(v) => writeln!(text, "[reference.ramp]\nrate_deg_s = {v:?}"),

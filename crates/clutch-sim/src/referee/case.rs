@@ -1,7 +1,7 @@
 //! A case as its file has it, checked.
 
 use super::mechanism::{Mechanism, Row};
-use super::model::{Model, ScenarioCase};
+use super::model::{CaseModel, ScenarioCase};
 use super::observe::Observe;
 use super::signal::Signal;
 use crate::tables::{complete, read};
@@ -46,7 +46,7 @@ pub struct Case {
     /// The source of the expected values.
     pub source: String,
     /// The moving part.
-    pub model: Model,
+    pub model: CaseModel,
     /// Duration, s.
     pub duration: f64,
     /// Time between two samples of a trajectory, s.
@@ -182,7 +182,7 @@ impl Case {
                         "frequency_hz = {fastest:e}: expected at most {MOST_WAVES:e} waves in duration_s = {duration}"
                     )));
                 }
-                (Model::Mechanism(m), duration, sample)
+                (CaseModel::Mechanism(m), duration, sample)
             }
             (None, Some(s)) => {
                 if let Some(key) = [("duration_s", file.duration_s), ("sample_s", file.sample_s)]
@@ -197,7 +197,7 @@ impl Case {
                     })?;
                 crate::Scenario::parse("scenario", built_in.toml, &s.set)
                     .map_err(|e| wrong(format!("scenario.set: {e}")))?;
-                (Model::Scenario(s), 0.0, 0.0)
+                (CaseModel::Scenario(s), 0.0, 0.0)
             }
             (None, None) => return Err(wrong("expected [mechanism] or [scenario]; found none".into())),
             (Some(_), Some(_)) => {
@@ -236,8 +236,8 @@ impl Case {
     #[must_use]
     pub fn told(&self) -> serde_json::Value {
         let mechanism = match &self.model {
-            Model::Scenario(_) => serde_json::Value::Null,
-            Model::Mechanism(m) => json!({
+            CaseModel::Scenario(_) => serde_json::Value::Null,
+            CaseModel::Mechanism(m) => json!({
                 "inertia": m.inertia, "stiffness": m.stiffness, "damping": m.damping,
                 "position": m.position, "velocity": m.velocity,
                 "load": m.load.iter().map(Signal::told).collect::<Vec<_>>(),

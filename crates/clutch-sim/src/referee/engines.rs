@@ -2,7 +2,7 @@
 
 use super::case::{Case, CaseError};
 use super::mechanism::{Mechanism, Padded, Row};
-use super::model::{Model, ScenarioCase};
+use super::model::{CaseModel, ScenarioCase};
 use super::trajectory::{Trajectory, TrajectoryEvent};
 use crate::drive::{Drive, RampDrive};
 use crate::engine::rosenbrock::Linear;
@@ -14,7 +14,7 @@ use crate::progress::UNWATCHED;
 use crate::run::Keep;
 use crate::scenario::Scenario;
 use crate::scenario_error::ScenarioError;
-use crate::system::{BristledMotion, Mode, Motion, State, SystemError};
+use crate::system::{BristledMotion, Mode, Motion, SystemError, SystemState};
 use clutch_core::friction::FrictionModel;
 use clutch_core::{ActuatorParams, ParamError, Plant, PlantParams};
 use nalgebra::SVector;
@@ -91,8 +91,8 @@ pub enum RefereeError {
 /// [`RefereeError::NotForIt`] where the engine does not take the case; a motion that cannot be followed.
 pub fn run(case: &Case, engine: RefereeEngine, step: Option<f64>) -> Result<Trajectory, RefereeError> {
     let mechanism = match &case.model {
-        Model::Mechanism(mechanism) => mechanism,
-        Model::Scenario(scenario) => return run_scenario(case, scenario, engine),
+        CaseModel::Mechanism(mechanism) => mechanism,
+        CaseModel::Scenario(scenario) => return run_scenario(case, scenario, engine),
     };
     let bristled = mechanism.rows.iter().filter(|row| row.friction.bristles().is_some()).count();
     let needs_none = not_for_it("it needs friction without bristles");
@@ -148,9 +148,9 @@ fn empty(case: &Case, mechanism: &Mechanism) -> Trajectory {
     }
 }
 
-fn begin<const N: usize>(m: &Mechanism) -> State<N> {
+fn begin<const N: usize>(m: &Mechanism) -> SystemState<N> {
     let padded = |list: &[f64]| SVector::from_fn(|i, _| list.get(i).copied().unwrap_or(0.0));
-    State { time: 0.0, position: padded(&m.position), velocity: padded(&m.velocity) }
+    SystemState { time: 0.0, position: padded(&m.position), velocity: padded(&m.velocity) }
 }
 
 impl Trajectory {

@@ -22,7 +22,7 @@ pub use case::{Case, CaseError, Expect};
 pub use engines::{ENGINES, RefereeEngine, RefereeError, run};
 pub use judge::Verdict;
 pub use mechanism::{Mechanism, Row};
-pub use model::{Model, ScenarioCase};
+pub use model::{CaseModel, ScenarioCase};
 pub use observe::Observe;
 pub use signal::{Signal, Term};
 pub use trajectory::{Trajectory, TrajectoryEvent};

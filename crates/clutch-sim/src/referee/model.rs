@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 /// The moving part of a case.
 #[derive(Clone, Debug)]
-pub enum Model {
+pub enum CaseModel {
     /// A linear mechanism with rows of friction.
     Mechanism(Mechanism),
     /// A built-in scenario with changes: shaft, encoder, law, converter.

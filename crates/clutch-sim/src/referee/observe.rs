@@ -1,6 +1,6 @@
 //! The observations that a case makes of a trajectory.
 
-use super::model::Model;
+use super::model::CaseModel;
 use crate::metrics::{Detected, Metrics, figure_columns};
 use serde::Deserialize;
 
@@ -80,7 +80,7 @@ pub struct Observe {
 
 impl Observe {
     /// Its flaw, for a model of that duration, s.
-    pub(super) fn check(&self, model: &Model, duration: f64) -> Result<(), String> {
+    pub(super) fn check(&self, model: &CaseModel, duration: f64) -> Result<(), String> {
         let (quantity, keys, needed) = self.kind.keys();
         let weighs = self.position.is_some() || self.velocity.is_some() || self.torque.is_some();
         let given = [
@@ -123,10 +123,10 @@ impl Observe {
             return Err("number = 0: expected a whole number of at least 1".into());
         }
         match model {
-            Model::Scenario(_) if self.kind != Kind::Metric => {
+            CaseModel::Scenario(_) if self.kind != Kind::Metric => {
                 Err("kind: a scenario has metrics only".into())
             }
-            Model::Scenario(_) => {
+            CaseModel::Scenario(_) => {
                 let none = (Metrics::default(), Detected::default());
                 let names = figure_columns(&none.0, &none.1).map(|(name, _)| name);
                 let name = self.metric.as_deref().unwrap_or_default();
@@ -136,8 +136,10 @@ impl Observe {
                 }
                 Err(format!("metric = \"{name}\": expected one of: {}", names.join(", ")))
             }
-            Model::Mechanism(_) if self.kind == Kind::Metric => Err("kind: metrics are of scenarios".into()),
-            Model::Mechanism(m) => {
+            CaseModel::Mechanism(_) if self.kind == Kind::Metric => {
+                Err("kind: metrics are of scenarios".into())
+            }
+            CaseModel::Mechanism(m) => {
                 let (joints, rows) = (m.joints(), m.rows.len());
                 let weights = [
                     ("position", &self.position, joints),

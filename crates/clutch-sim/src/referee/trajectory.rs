@@ -1,7 +1,7 @@
 //! The motion that an engine made of a case.
 
 use super::case::{Case, CaseError};
-use super::model::Model;
+use super::model::CaseModel;
 
 /// A row that began to hold or to slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ impl Trajectory {
     /// # Errors
     /// The list that has not the length of the case, or has a value that is no number.
     pub fn check(&self, case: &Case) -> Result<(), CaseError> {
-        let Model::Mechanism(mechanism) = &case.model else { return Ok(()) };
+        let CaseModel::Mechanism(mechanism) = &case.model else { return Ok(()) };
         let count = case.samples() + 1;
         let lists = |name: &str, lists: &[Vec<f64>], expected: usize| {
             if lists.len() != expected {
@@ -80,7 +80,7 @@ impl Trajectory {
 
     /// Rows that hold and slip, as the engine says or, if it has no such thing, as slip rates above and below `still` say.
     pub(super) fn events_of(&self, case: &Case, row: usize) -> Vec<(f64, bool)> {
-        let Model::Mechanism(mechanism) = &case.model else { return Vec::new() };
+        let CaseModel::Mechanism(mechanism) = &case.model else { return Vec::new() };
         let r = &mechanism.rows[row];
         let slip = |k: usize| {
             let along = r.joints.iter().zip(&self.velocity).map(|(j, v)| j * v[k]).sum::<f64>();

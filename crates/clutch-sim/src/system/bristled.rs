@@ -5,7 +5,7 @@
 //! ```
 
 use super::System;
-use super::state::{State, SystemError};
+use super::state::{SystemError, SystemState};
 use crate::engine::rosenbrock::{self, Linear};
 use clutch_core::friction::{Bend, Bristles, FrictionModel};
 use nalgebra::SVector;
@@ -37,7 +37,7 @@ where
     ///
     /// # Errors
     /// A friction without bristles; an inertia that is none.
-    pub fn new(system: &'a S, state: State<N>) -> Result<Self, SystemError> {
+    pub fn new(system: &'a S, state: SystemState<N>) -> Result<Self, SystemError> {
         const { assert!(D == 2 * N + B, "D is 2 N + B") };
         let bristles: Vec<_> = (0..B).filter_map(|row| system.friction(row).bristles()).collect();
         let Ok(bristles) = <[Bristles<f64>; B]>::try_from(bristles) else {
@@ -68,9 +68,9 @@ where
 
     /// The state that it is in.
     #[must_use]
-    pub fn state(&self) -> State<N> {
+    pub fn state(&self) -> SystemState<N> {
         let (position, velocity) = Self::split(&self.state);
-        State { time: self.time, position, velocity }
+        SystemState { time: self.time, position, velocity }
     }
 
     /// Friction of the rows, N m.

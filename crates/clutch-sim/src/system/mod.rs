@@ -24,7 +24,7 @@ mod state;
 pub use bristled::BristledMotion;
 pub use modes::{Held, hold};
 pub use motion::{Motion, SystemEvent};
-pub use state::{INSTANT, Mode, State, SystemError};
+pub use state::{INSTANT, Mode, SystemError, SystemState};
 
 use clutch_core::Friction;
 use nalgebra::{SMatrix, SVector};

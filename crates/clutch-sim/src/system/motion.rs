@@ -4,7 +4,7 @@ use super::System;
 use super::letting_go::{Instant, Search, Stretch, Value, slowest};
 use super::modes::hold;
 use super::span::Span;
-use super::state::{Equations, INSTANT, Mode, State, SystemError};
+use super::state::{Equations, INSTANT, Mode, SystemError, SystemState};
 use crate::engine::pair::{A, C, E};
 use clutch_core::friction::FrictionModel;
 use nalgebra::SVector;
@@ -30,7 +30,7 @@ pub struct SystemEvent {
 #[derive(Clone, Debug)]
 pub struct Motion<'a, S, const N: usize, const B: usize> {
     system: &'a S,
-    state: State<N>,
+    state: SystemState<N>,
     modes: [Mode; B],
     /// Step that the last stretch ended with, s.
     step: f64,
@@ -47,7 +47,7 @@ type Rates<const N: usize> = [SVector<f64, N>; 2];
 
 /// A step: its end, its error over the tolerance, rates and equations at the end.
 pub(super) struct Step<const N: usize, const B: usize> {
-    to: State<N>,
+    to: SystemState<N>,
     error: f64,
     rates: Rates<N>,
     pub(super) equations: Equations<N, B>,
@@ -60,7 +60,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
     ///
     /// # Errors
     /// A friction with bristles; an inertia that is none.
-    pub fn new(system: &'a S, state: State<N>) -> Result<Self, SystemError> {
+    pub fn new(system: &'a S, state: SystemState<N>) -> Result<Self, SystemError> {
         if let Some(row) = (0..B).find(|row| system.friction(*row).bristles().is_some()) {
             return Err(SystemError::Bristles(row));
         }
@@ -86,7 +86,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
 
     /// The state that it is in.
     #[must_use]
-    pub fn state(&self) -> &State<N> {
+    pub fn state(&self) -> &SystemState<N> {
         &self.state
     }
 
@@ -115,8 +115,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         })
     }
 
-    fn equations(&self, state: &State<N>) -> Result<Equations<N, B>, SystemError> {
-        let State { time, position, velocity } = state;
+    fn equations(&self, state: &SystemState<N>) -> Result<Equations<N, B>, SystemError> {
+        let SystemState { time, position, velocity } = state;
         let inertia = self.system.inertia(position);
         let inverse = inertia.cholesky().ok_or(SystemError::Inertia(*time))?.inverse();
         let rows = self.system.rows(position);
@@ -136,7 +136,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         self.modes.map(|mode| mode == Mode::Stuck)
     }
 
-    fn rate(&self, state: &State<N>, e: &Equations<N, B>) -> Rates<N> {
+    fn rate(&self, state: &SystemState<N>, e: &Equations<N, B>) -> Rates<N> {
         if !self.stuck().contains(&true) {
             return [state.velocity, e.free];
         }
@@ -190,7 +190,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
     pub(super) fn step(&self, h: f64) -> Result<Step<N, B>, SystemError> {
         let from = &self.state;
         if self.at_rest {
-            let to = State { time: from.time + h, ..*from };
+            let to = SystemState { time: from.time + h, ..*from };
             let equations = self.equations(&to)?;
             return Ok(Step { to, error: 0.0, rates: [SVector::zeros(); 2], equations, between: None });
         }
@@ -203,7 +203,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         let mut k = [first; 7];
         let mut to = *from;
         for i in 0..6 {
-            to = State { time: from.time + C[i] * h, ..*from };
+            to = SystemState { time: from.time + C[i] * h, ..*from };
             for (a, k) in A[i].iter().zip(&k).take(i + 1) {
                 to.position += k[0] * (h * a);
                 to.velocity += k[1] * (h * a);
@@ -314,7 +314,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         };
         // A jump at the end is not within the step.
         let end = if jumps {
-            self.equations(&State { time: step.to.time.next_down(), ..step.to })?
+            self.equations(&SystemState { time: step.to.time.next_down(), ..step.to })?
         } else {
             step.equations
         };

@@ -31,7 +31,7 @@ impl Mode {
 
 /// Positions and velocities at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State<const N: usize> {
+pub struct SystemState<const N: usize> {
     /// s
     pub time: f64,
     /// rad
