@@ -38,6 +38,20 @@ impl Display for Counts {
     }
 }
 
+impl Counts {
+    /// These and others, of the same code.
+    pub(crate) fn and(&self, other: &Counts) -> Counts {
+        let sum = |c: &Counts| c.mean * c.calls as u64;
+        let calls = self.calls + other.calls;
+        Counts {
+            calls,
+            least: self.least.min(other.least),
+            mean: (sum(self) + sum(other)) / calls.max(1) as u64,
+            most: self.most.max(other.most),
+        }
+    }
+}
+
 /// The whole output.
 pub(crate) struct Measured {
     /// In the order of the measurements.

@@ -7,12 +7,14 @@
 //! a bound its budget.
 
 mod against_c;
+mod chip;
 mod emulator;
 mod memory;
 mod plan;
 
 use against_c::Compared;
 use anyhow::{Context, Result, bail};
+use chip::OnChip;
 use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
 use emulator::Measured;
 use plan::{Item, Plan};
@@ -107,6 +109,10 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         Some(why) => skipped(&why).map(|()| None)?,
         None => Some(emulator::measure(&path)?),
     };
+    let on_chip = match chip::no_model() {
+        Some(why) => skipped(&why).map(|()| None)?,
+        None => Some(chip::measure(&flashed)?),
+    };
     if let Some(why) = no_gcc {
         skipped(&format!("{why}: the laws in C are not compared"))?;
     }
@@ -114,7 +120,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         Some(m) => gone(&path, &image, &plan, m)?,
         None => BTreeMap::new(),
     };
-    over.extend(table(&plan, &image, &bounds, measured.as_ref(), &cycles));
+    over.extend(table(&plan, &image, &bounds, (measured.as_ref(), on_chip.as_ref()), &cycles));
     measured.iter().for_each(frictions);
     let compared = |m: &&Measured| plan.in_c().any(|symbol| m.counts.contains_key(symbol));
     if let Some(measured) = measured.as_ref().filter(compared) {
@@ -239,7 +245,7 @@ fn table(
     plan: &Plan,
     image: &Image,
     bounds: &[Cost],
-    measured: Option<&Measured>,
+    (measured, on_chip): (Option<&Measured>, Option<&OnChip>),
     cycles: &BTreeMap<String, Cost>,
 ) -> Vec<String> {
     let mut over = Vec::new();
@@ -256,7 +262,11 @@ fn table(
         (is > may).then(|| format!("{}: {what}: {is}, at most {may}", item.name))
     };
     for (item, bound) in plan.items.iter().zip(bounds) {
-        let counts = measured.and_then(|m| m.counts.get(&item.measured));
+        let flashed = item.image.is_some();
+        let counts = match flashed {
+            true => on_chip.and_then(|m| m.get(item.measured.as_str())),
+            false => measured.and_then(|m| m.counts.get(&item.measured)),
+        };
         let along = cycles.get(&item.measured).map(|c| c.cycles);
         println!(
             "| {} | {} | {} | {} | {} | {} | {} | {:.2} % |",
@@ -273,12 +283,14 @@ fn table(
         over.extend(exceeds(item, "bound, cycles", bound.cycles, item.budget.cycles));
         over.extend(exceeds(item, "measured instructions", counts.map_or(0, |c| c.most), bound.instructions));
         over.extend(exceeds(item, "measured cycles", along.unwrap_or(0), bound.cycles));
-        if measured.is_some() && counts.is_none() && !item.measured.is_empty() {
-            over.push(format!("{}: the image did not measure it", item.name));
+        let was_measured = if flashed { on_chip.is_some() } else { measured.is_some() };
+        if was_measured && counts.is_none() && !item.measured.is_empty() {
+            over.push(format!("{}: no run has measured {}", item.name, item.measured));
         }
     }
     let known = |name: &str| {
-        plan.items.iter().any(|i| i.measured == name) || plan.in_c().any(|symbol| symbol == name)
+        plan.items.iter().any(|i| i.image.is_none() && i.measured == name)
+            || plan.in_c().any(|symbol| symbol == name)
     };
     // Names that are no function's are those of a law over another friction: some laws have none.
     for name in measured.iter().flat_map(|m| &m.names) {

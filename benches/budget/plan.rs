@@ -43,7 +43,8 @@ pub(crate) struct Item {
     pub(crate) image: Option<String>,
     /// Its name in the image.
     pub(crate) symbol: String,
-    /// The name under which the measuring image prints its counts; empty for what is not measured there.
+    /// The name of its counts, as the measuring image prints them, or as the runs on the chip have them; empty for what is
+    /// not measured.
     #[serde(default)]
     pub(crate) measured: String,
     /// True if its cycles along the executed paths are added up, too.
@@ -57,8 +58,9 @@ pub(crate) struct Item {
     loops: Vec<LoopFact>,
     #[serde(default, rename = "call")]
     calls: Vec<CallFact>,
-    /// The same code in an image that is flashed: a row of its own, on the same statements.
-    flashed: Option<Flashed>,
+    /// The same code in images that are flashed: rows of their own, on the same statements.
+    #[serde(default)]
+    flashed: Vec<Flashed>,
 }
 
 /// A function of an image that is flashed.
@@ -68,6 +70,7 @@ struct Flashed {
     name: String,
     image: String,
     symbol: String,
+    measured: String,
     #[serde(default)]
     until: Vec<String>,
     budget: Limit,
@@ -142,19 +145,21 @@ impl Plan {
 }
 
 impl Item {
-    /// It, and the same code in the image that is flashed.
+    /// It, and the same code in images that are flashed.
     fn with_flashed(mut self) -> impl Iterator<Item = Item> {
-        let flashed = self.flashed.take().map(|f| Item {
+        let flashed = std::mem::take(&mut self.flashed);
+        let (loops, calls) = (self.loops.clone(), self.calls.clone());
+        let flashed = flashed.into_iter().map(move |f| Item {
             name: f.name,
             image: Some(f.image),
             symbol: f.symbol,
-            measured: String::new(),
+            measured: f.measured,
             traced: false,
             until: f.until,
             budget: f.budget,
-            loops: self.loops.clone(),
-            calls: self.calls.clone(),
-            flashed: None,
+            loops: loops.clone(),
+            calls: calls.clone(),
+            flashed: Vec::new(),
         });
         std::iter::once(self).chain(flashed)
     }

@@ -19,7 +19,8 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         | "eor" | "hint" | "it" | "lsl" | "lsr" | "mov" | "movs" | "movt" | "movw" | "mul" | "mvn"
         | "nop" | "orn" | "orr" | "qadd" | "qsub" | "pkhbt" | "pkhtb" | "rbit" | "rev" | "rev16"
         | "revsh" | "ror" | "rrx" | "rsb" | "sbc" | "sbfx" | "ssat" | "sub" | "subw" | "sxtab" | "sxtah"
-        | "sxtb" | "sxth" | "teq" | "tst" | "ubfx" | "usat" | "uxtab" | "uxtah" | "uxtb" | "uxth" => 1,
+        | "sxtb" | "sxth" | "teq" | "tst" | "ubfx" | "uqadd8" | "usat" | "uxtab" | "uxtah" | "uxtb"
+        | "uxth" => 1,
         "smlabb" | "smlabt" | "smlatb" | "smlatt" | "smlal" | "smulbb" | "smulbt" | "smultb" | "smultt"
         | "smull" | "smmul" | "smmla" | "umaal" | "umlal" | "umull" => 1,
         // 1 and what a store on its way takes.

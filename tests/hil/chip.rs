@@ -113,6 +113,12 @@ fn the_prefetch_of_the_flash_is_on_in_the_images_of_the_nucleo() {
         let mean = |key: &str| counted["period"][key]["mean"].as_f64().expect("a number");
         let (best, without) = (mean("estimated_us"), mean("estimated_us_without_prefetch"));
         assert!(0.0 < best && best < 0.8 * without, "{name}: {best} µs, {without} µs without");
+        // The servo is a part of the way from the sample to the converter.
+        let of = |key: &str| counted[key]["instructions"]["mean"].as_f64();
+        if role == ChipRole::Controller {
+            let (servo, all) = (of("servo").expect("a servo"), of("sample_to_converter").expect("a way"));
+            assert!(50.0 < servo && servo < 0.5 * all, "{name}: {servo} of {all} instructions");
+        }
     }
 }
 
@@ -308,22 +314,24 @@ fn a_converter_that_does_not_follow_ends_the_run() {
 
 #[test]
 fn an_amplifier_that_does_not_follow_ends_the_run_where_its_voltage_is_read_back() {
-    const READ_BACK: &str = "nucleo-daq-read-back";
-    let Some(wired) = image(READ_BACK) else { return };
-    // Without a fault it is as any other.
-    figures_and_codes_are_the_simulations(READ_BACK, ChipRole::Daq, "smc");
-    let _beside = beside();
-    let ChipReport { ran, resets, .. } = broken(&wired, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
-    assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)));
-    assert_eq!(resets, 0);
-    // Three voltages in a row that are off, the first of which a period later.
-    let safe = ran.safe.expect("a safe output") - ran.hit.expect("a fault");
-    assert!((0.003..=0.0045).contains(&safe), "the safe output came after {safe} s");
-    // Elsewhere the shaft's motion shows it, later.
-    let Some(bare) = image("nucleo-daq") else { return };
-    let ChipReport { ran: later, .. } = broken(&bare, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
-    assert_eq!((later.standing.state, later.standing.cause), (State::Faulted, Cause::TooFast));
-    assert!(later.safe.expect("a safe output") - later.hit.expect("a fault") > 2.0 * safe);
+    for (name, role) in IMAGES.into_iter().filter(|(name, _)| !pico(name)) {
+        let wired = format!("{name}-read-back");
+        let (Some(bare), Some(with)) = (image(name), image(&wired)) else { return };
+        // Without a fault it is as any other.
+        figures_and_codes_are_the_simulations(&wired, role, "smc");
+        let _beside = beside();
+        let ChipReport { ran, resets, .. } = broken(&with, role, ChipFaultKind::Amplifier, Some(0.3));
+        assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
+        assert_eq!(resets, 0, "{name}");
+        // Three voltages in a row that are off, the first of which a period later.
+        let safe = ran.safe.expect("a safe output") - ran.hit.expect("a fault");
+        assert!((0.003..=0.0045).contains(&safe), "{name}: the safe output came after {safe} s");
+        // Elsewhere the shaft's motion shows it, later.
+        let ChipReport { ran: later, .. } = broken(&bare, role, ChipFaultKind::Amplifier, Some(0.3));
+        let standing = (later.standing.state, later.standing.cause);
+        assert_eq!(standing, (State::Faulted, Cause::TooFast), "{name}");
+        assert!(later.safe.expect("a safe output") - later.hit.expect("a fault") > 2.0 * safe, "{name}");
+    }
 }
 
 #[test]

@@ -167,5 +167,6 @@ pub(crate) fn on_rp2040js(command: &Path) -> Result<(bool, String)> {
 }
 
 fn report(what: &str) -> Result<()> {
-    cargo(["bench", "--package", "clutch-benches", "--bench", "budget", "--", what]).run()
+    let bench = cargo(["bench", "--package", "clutch-benches", "--bench", "budget", "--", what]);
+    bench.env("CLUTCH_PYTHON", python::interpreter()?).run()
 }

@@ -3,8 +3,8 @@
 #![no_std]
 
 pub mod board;
-mod daq;
 pub mod fault;
+mod program;
 mod read_back;
 pub mod run;
 #[path = "../../shared/stack_guard.rs"]

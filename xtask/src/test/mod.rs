@@ -275,6 +275,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
     let mut said = String::new();
     let budget = cargo(["test"]).args(WORKSPACE).args(["--bench", "budget"]);
+    let budget = budget.env("CLUTCH_PYTHON", python::interpreter()?);
     let kept = budget.lines(|line| said.extend([line, "\n"]))?;
     tally.check_seen("bounds, measurements, memory and stack keep their budgets", (kept, said));
     Ok(())

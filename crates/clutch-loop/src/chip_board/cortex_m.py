@@ -732,6 +732,10 @@ class Meter(ABC):
         self.out: Counts | None = None
         self.kind = "other"
         self.counted: dict[str, list[Counts]] = {}
+        # The servo, where an image has one, and what was counted before it was called last, from where.
+        self.servo = next((at & ~1 for name, at in symbols(chip.image) if b"servo" in name and b"step" in name), -1)
+        self.asked: Counts | None = None
+        self.asked_from = -1
         chip.uc.hook_add(uc_const.UC_HOOK_CODE, self.instruction)
         chip.uc.hook_add(uc_const.UC_HOOK_MEM_READ, self.load, None, chip.FLASH.start, chip.FLASH.stop - 1)
 
@@ -748,6 +752,11 @@ class Meter(ABC):
         """A datum in flash is loaded."""
 
     def instruction(self, uc: Uc, at: int, size: int, _data: Any) -> None:
+        if at == self.servo:
+            self.asked, self.asked_from = self.now(), uc.reg_read(arm.UC_ARM_REG_LR) & ~1
+        elif at == self.asked_from and self.asked:
+            self.since("servo", self.asked, self.now())
+            self.asked = None
         self.executed += 1
         cost = self.cost.get(at)
         if cost is None:

@@ -132,6 +132,13 @@ pub(super) struct Answer {
     pub(super) sent: Vec<u8>,
 }
 
+/// Tries before the run whether a file can be written after it, and leaves nothing.
+fn writable(file: &Path) -> std::io::Result<()> {
+    let new = !file.exists();
+    std::fs::OpenOptions::new().append(true).create(true).open(file)?;
+    if new { std::fs::remove_file(file) } else { Ok(()) }
+}
+
 /// Numbers of instructions, as JSON.
 pub type Counted = serde_json::Value;
 
@@ -157,9 +164,7 @@ impl Chip {
         // -P: a file in the working directory is no module.
         command.args(["-P", "-c", LOADER, CORE, kind.model()]).arg(image);
         if let Some(file) = count {
-            // Before the run, not after it.
-            std::fs::File::create(file)
-                .map_err(|e| ChipError::Counted(format!("{}: {e}", file.display())))?;
+            writable(file).map_err(|e| ChipError::Counted(format!("{}: {e}", file.display())))?;
             command.arg("--count").arg(file);
         }
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -1,0 +1,159 @@
+//! Counts of instructions of the images that are flashed, in runs on the model of their chip.
+
+use crate::emulator::Counts;
+use anyhow::{Context, Result};
+use clutch_loop::chip_board::{ChipOptions, ChipRole, ChipSession, Counted};
+use clutch_loop::lockstep_session::LockstepOptions;
+use clutch_sim::Scenario;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A run of 0.4 s on the chip.
+struct Run {
+    image: &'static str,
+    law: &'static str,
+    set: &'static [(&'static str, &'static str)],
+    /// True if it is counted to its end; else while it goes on.
+    ends: bool,
+    /// Rows of firmware/budget.toml that it measures, by `measured`, and what of it.
+    rows: &'static [(&'static str, &'static str)],
+}
+
+const CONTROLLER: &str = "nucleo-controller";
+const DURATION_S: f64 = 0.4;
+const TABLE: &[(&str, &str)] = &[(
+    "reference",
+    "{ table = { interpolation = \"cubic\", points_s_deg = [[0.0, 0.0], [0.1, 0.2], [0.2, 0.45], [0.4, 0.8]] } }",
+)];
+const ANY_EXPONENT: &[(&str, &str)] = &[("model.friction.stribeck.stribeck_exponent", "1.5")];
+
+const CODE: &str = "sample_to_converter";
+const PERIOD: &str = "period";
+const SERVO: &str = "servo";
+const LAWS: &[(&str, &str)] = &[("code", CODE), ("goes_on", PERIOD), ("servo", SERVO)];
+
+const fn goes_on(
+    law: &'static str,
+    set: &'static [(&'static str, &'static str)],
+    rows: &'static [(&'static str, &'static str)],
+) -> Run {
+    Run { image: CONTROLLER, law, set, ends: false, rows }
+}
+
+const fn ends(
+    law: &'static str,
+    set: &'static [(&'static str, &'static str)],
+    rows: &'static [(&'static str, &'static str)],
+) -> Run {
+    Run { image: CONTROLLER, law, set, ends: true, rows }
+}
+
+const RUNS: [Run; 14] = [
+    goes_on("pd", &[], LAWS),
+    goes_on("ctc", &[], LAWS),
+    goes_on("smc", &[], LAWS),
+    goes_on("pid", &[], LAWS),
+    goes_on("super_twisting", &[], LAWS),
+    goes_on("ctc", ANY_EXPONENT, &[("code_power", CODE), ("servo", SERVO)]),
+    goes_on("glide", &[], &[("code_glide", CODE), ("goes_on_glide", PERIOD), ("servo", SERVO)]),
+    goes_on("smc", TABLE, &[("goes_on_table", PERIOD)]),
+    ends("smc", &[], &[("any", PERIOD)]),
+    ends("smc", TABLE, &[("any_table", PERIOD)]),
+    ends("glide", &[], &[("any_glide", PERIOD)]),
+    Run {
+        image: "nucleo-controller-read-back",
+        ..goes_on("smc", &[], &[("code_read_back", CODE), ("goes_on_read_back", PERIOD)])
+    },
+    Run {
+        image: "nucleo-daq-read-back",
+        ..ends("smc", &[], &[("daq_code_read_back", CODE), ("daq_any_read_back", PERIOD)])
+    },
+    Run {
+        image: "nucleo-daq",
+        law: "smc",
+        set: &[],
+        ends: true,
+        rows: &[("daq_code", CODE), ("daq_any", PERIOD)],
+    },
+];
+
+/// Counts by the names of rows.
+pub(crate) type OnChip = BTreeMap<&'static str, Counts>;
+
+/// A message if the model of the chip cannot run.
+pub(crate) fn no_model() -> Option<String> {
+    let python = std::env::var_os("CLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
+    let there =
+        Command::new(&python).args(["-c", "import unicorn"]).output().is_ok_and(|o| o.status.success());
+    let why = "has no module unicorn, on which the flashed images are measured: CLUTCH_PYTHON names another";
+    (!there).then(|| format!("{} {why}", python.display()))
+}
+
+/// Makes the runs with the images of a folder.
+pub(crate) fn measure(images: &Path) -> Result<OnChip> {
+    let (next, counted) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        while let Some(run) = RUNS.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let of = run.count(images).with_context(|| format!("{} under {}", run.image, run.law));
+            counted.lock().unwrap_or_else(|e| e.into_inner()).push((run, of));
+        }
+    };
+    std::thread::scope(|scope| (0..2).for_each(|_| drop(scope.spawn(work))));
+    let mut measured = OnChip::new();
+    for (run, of) in counted.into_inner().unwrap_or_else(|e| e.into_inner()) {
+        let of = of?;
+        for (row, what) in run.rows {
+            let counts = counts(&of[*what]).with_context(|| format!("{}: no counts of {what}", run.image))?;
+            measured.entry(row).and_modify(|all| *all = all.and(&counts)).or_insert(counts);
+        }
+    }
+    Ok(measured)
+}
+
+impl Run {
+    fn count(&self, images: &Path) -> Result<Counted> {
+        let text = format!(
+            "name = \"budget\"\n[rig]\nbase = \"paper\"\nencoder.counts_per_rev = 20000\ndac.bits = 12\n\
+             dac.lowest_v = 0.0\ndac.highest_v = 10.0\n[law.{}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
+             [sampling]\nscalar = \"f32\"\n[run]\nduration_s = {DURATION_S:?}\nsettle_s = 0.1\nstart = \"rest\"\n\
+             [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 4.5\n\
+             [safety.limits]\nfollowing_error_deg = 5.0\n",
+            self.law
+        );
+        let set: Vec<_> =
+            self.set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let scenario = Scenario::parse("budget", &text, &set)?;
+        let file = std::env::temp_dir().join(format!("clutch-budget-{}-{self:p}.json", std::process::id()));
+        let chip = ChipOptions {
+            count: Some(file.clone()),
+            until: (!self.ends).then_some(DURATION_S - 0.05),
+            ..ChipOptions::default()
+        };
+        let options = LockstepOptions {
+            log: None,
+            uncertified: true,
+            faults: Vec::new(),
+            seed: 1,
+            latency_ns: 0,
+            silence: None,
+            version: String::new(),
+        };
+        let image = images.join(self.image);
+        let report = ChipSession::new(scenario, options, chip, ChipRole::of(&image))?.run(&image)?;
+        std::fs::remove_file(&file)?;
+        report.counted.context("nothing was counted")
+    }
+}
+
+fn counts(of: &Counted) -> Option<Counts> {
+    let number = |key: &str| of["instructions"][key].as_f64();
+    Some(Counts {
+        calls: of["count"].as_u64()? as usize,
+        least: number("lowest")? as u64,
+        mean: number("mean")?.round() as u64,
+        most: number("highest")? as u64,
+    })
+}
