@@ -1,5 +1,6 @@
 //! Images of the boards: built, flashed, measured.
 
+use crate::panic_path;
 use crate::python;
 use crate::run::{Program, cargo, program, root};
 use anyhow::{Context, Result, bail};
@@ -112,7 +113,29 @@ fn build_one(board: (&str, &str)) -> Result<()> {
     program("rustup").args(["target", "add", board.1]).run().with_context(|| {
         format!("the board's Rust target is missing, and there is no rustup to add it: install {}", board.1)
     })?;
-    image(board).run()
+    image(board).run().or_else(|why| bail!("{why:#}\n{}", panicking(board)?))
+}
+
+/// The places that keep a board's images from being linked because they call for a panic; nothing, if they are kept by another
+/// error.
+pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
+    let named = "../target/firmware_named";
+    let image = panic_path::in_spite(image((board, target)), target).args(["--target-dir", named]);
+    let (built, _) = image.silently()?;
+    if !built {
+        return Ok(String::new());
+    }
+    if let Some(why) = panic_path::no_objdump() {
+        return Ok(why);
+    }
+    let mut places = String::new();
+    for file in std::fs::read_dir(root().join("target/firmware_named").join(target).join("release"))? {
+        let path = file?.path();
+        if path.is_file() && std::fs::read(&path)?.starts_with(b"\x7fELF") {
+            places += &panic_path::of_image(&path)?.unwrap_or_default();
+        }
+    }
+    Ok(places)
 }
 
 fn flash(board: Flashed, role: Role) -> Result<()> {

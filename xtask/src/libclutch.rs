@@ -1,5 +1,6 @@
 //! libclutch: static libraries for C, in target/libclutch.
 
+use crate::panic_path;
 use crate::run::{cargo, program, root};
 use anyhow::{Context, Result, bail, ensure};
 use std::path::{Path, PathBuf};
@@ -75,16 +76,27 @@ pub(crate) fn folder() -> PathBuf {
 /// Builds the library of a target; its path. One in which a panic can be reached is refused.
 pub(crate) fn built(target: &str) -> Result<PathBuf> {
     let built = compiled(target, "staticlib", &folder().join("build"))?;
-    ensure!(!names(&built, SURVIVED)?, "a panic can be reached in libclutch for {target}");
+    if names(&built, SURVIVED)? {
+        bail!("a panic can be reached in libclutch for {target}\n{}", panicking(target, &built)?);
+    }
     let library = folder().join(target).join("libclutch.a");
     std::fs::create_dir_all(folder().join(target))?;
     std::fs::copy(&built, &library)?;
     Ok(library)
 }
 
-/// True if a panic that is put in is seen. Built where nobody takes it for a library.
-pub(crate) fn sees_a_panic(target: &str) -> Result<bool> {
-    names(&compiled(target, "staticlib,control", &root().join("target/libclutch_control"))?, SURVIVED)
+/// The functions of a library that call for a panic, where they can be named: on Arm cores.
+fn panicking(target: &str, library: &Path) -> Result<String> {
+    if !target.starts_with("thumb") {
+        return Ok(format!("cargo xtask libclutch {} names the function", TARGETS[1]));
+    }
+    panic_path::no_objdump().map_or_else(|| panic_path::of_library(library), Ok)
+}
+
+/// True if a panic that is put in is seen, and the functions that are named for it. Built where nobody takes it for a library.
+pub(crate) fn sees_a_panic(target: &str) -> Result<(bool, String)> {
+    let library = compiled(target, "staticlib,control", &root().join("target/libclutch_control"))?;
+    Ok((names(&library, SURVIVED)?, panicking(target, &library)?))
 }
 
 fn compiled(target: &str, features: &str, cache: &Path) -> Result<PathBuf> {

@@ -14,6 +14,7 @@ mod libclutch;
 mod miri;
 mod mutants;
 mod neon;
+mod panic_path;
 mod playground;
 mod product;
 mod proof;

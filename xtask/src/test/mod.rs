@@ -7,6 +7,7 @@ use crate::firmware;
 use crate::fmu;
 use crate::fuzz;
 use crate::libclutch;
+use crate::panic_path;
 use crate::playground::{self, Playground};
 use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
@@ -260,7 +261,9 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     tally.check_quiet("the example with friction numbers of one's own builds for a Cortex-M4F", example);
     tally.stage("images");
     for board in firmware::BOARDS {
-        tally.check_quiet(&format!("the images of {} build", board.0), firmware::image(board).quietly()?);
+        let (built, text) = firmware::image(board).quietly()?;
+        let text = if built { text } else { text + &firmware::panicking(board)? };
+        tally.check_quiet(&format!("the images of {} build", board.0), (built, text));
         let small = firmware::image(board).args(SMALL).args(["--target-dir", "../target/firmware_small"]);
         tally.check_quiet(&format!("they build at opt-level s ({})", board.0), small.quietly()?);
     }
@@ -294,7 +297,7 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     };
     for (level, args) in [("3", &[][..]), ("s", &SMALL[..])] {
         let (links, text) = image("build", args).quietly()?;
-        let text = if links { text } else { text + &panicking(image("rustc", args))? };
+        let text = if links { text } else { text + &panicking(image("build", args))? };
         tally.check_quiet(
             &format!("no panic is reachable in clutch-core at opt-level {level} (link test)"),
             (links, text),
@@ -304,8 +307,8 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     let (links, text) = image("build", &with_one).quietly()?;
     let refused = !links && text.contains("__panic_path_survived");
     tally.check("the link test sees a panic that is put in (control)", refused);
-    if has_objdump() || std::env::var_os("CI").is_some() {
-        let named = panicking(image("rustc", &with_one))?;
+    if panic_path::has_objdump() || std::env::var_os("CI").is_some() {
+        let named = panicking(image("build", &with_one))?;
         let (one, place) = ("no_panic::control", "tests/no_panic/src/main.rs");
         let told = named.lines().any(|line| line.contains(one) && line.contains(place));
         tally.check_seen(
@@ -313,7 +316,10 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
             (told, named),
         );
     } else {
-        println!("skipped: the name of a function with a panic: {OBJDUMP} is not installed");
+        println!(
+            "skipped: the name of a function with a panic: {}",
+            panic_path::no_objdump().unwrap_or_default()
+        );
         tally.skip(1);
     }
     Ok(())
@@ -322,43 +328,18 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
 /// The folder of the link test's builds.
 const NO_PANIC: &str = "target/no_panic";
 
-/// They name places in an image; a Debian package has them that a user may not have.
-const OBJDUMP: &str = "arm-none-eabi-objdump";
-const ADDR2LINE: &str = "arm-none-eabi-addr2line";
-
-fn has_objdump() -> bool {
-    program(OBJDUMP).args(["--version"]).silently().is_ok_and(|(runs, _)| runs)
-}
-
 /// The places of the link test's image that call for a panic: the image is linked all the same, and read.
 fn panicking(image: Program) -> Result<String> {
-    let survives = ["--", "-C", "link-arg=--defsym=__panic_path_survived=0"];
-    let (built, text) = image.args(survives).silently()?;
+    if let Some(why) = panic_path::no_objdump() {
+        return Ok(why);
+    }
+    let (built, text) = panic_path::in_spite(image, firmware::TARGET).silently()?;
+    let linked = root().join(NO_PANIC).join(firmware::TARGET).join("release/no-panic");
     if !built {
         return Ok(text);
     }
-    let linked = root().join(NO_PANIC).join(firmware::TARGET).join("release/no-panic");
-    let Ok((true, code)) = program(OBJDUMP).args(["-d", "-C"]).arg(&linked).silently() else {
-        return Ok(format!("{OBJDUMP} would name the functions that panic; it is not installed"));
-    };
-    let (mut within, mut calls) = ("", Vec::new());
-    for line in code.lines() {
-        if line.ends_with(">:") {
-            within = line;
-        } else if line.contains("<core::panicking")
-            && !within.contains("<core::panicking")
-            && let Some((at, _)) = line.split_once(':')
-        {
-            calls.push(format!("0x{}", at.trim()));
-        }
-    }
-    if calls.is_empty() {
-        return Ok("no call for a panic is seen in the machine code".to_owned());
-    }
-    // With all that is compiled into its caller, the innermost first.
-    let (_, text) =
-        program(ADDR2LINE).args(["-i", "-f", "-C", "-p", "-a", "-e"]).arg(&linked).args(&calls).silently()?;
-    Ok(format!("paths to a panic:\n{text}"))
+    let seen = panic_path::of_image(&linked)?;
+    Ok(seen.unwrap_or_else(|| "no call for a panic is seen in the machine code".to_owned()))
 }
 
 /// The libraries for C, and the check that no panic can be reached in them.
@@ -378,8 +359,12 @@ fn libraries(tally: &mut Tally) -> Result<()> {
             (holds, text),
         );
     }
-    let seen = libclutch::sees_a_panic(firmware::TARGET)?;
-    tally.check("a panic that is put into libclutch is seen (control)", seen);
+    let (seen, named) = libclutch::sees_a_panic(firmware::TARGET)?;
+    let named_it = named.contains("clutch_control") || panic_path::no_objdump().is_some();
+    tally.check_quiet(
+        "a panic that is put into libclutch is seen, and its function is named (control)",
+        (seen && named_it, named),
+    );
     Ok(())
 }
 
