@@ -186,7 +186,7 @@ def _heavier(
 def identify(
     scenario: ScenarioLike = "board_smc_2",
     *,
-    logs: Iterable[str | os.PathLike[str]] = (),
+    logs: Iterable[str | os.PathLike[str]] | None = None,
     columns: tuple[str, str] = ("counts", "volts"),
     loaded: Iterable[str | os.PathLike[str]] = (),
     mass_kg: float | None = None,
@@ -216,8 +216,10 @@ def identify(
         The mass that was added, and the radius of the pulley that it hangs from.
     log : path, optional
         Folder for a log of each part of the experiment.
-    travel_deg, fastest_deg_s : float, optional
-        Way that a motor axis goes forwards from where it rests (20°), and its highest rate (60 °/s).
+    travel_deg : float, optional
+        Way that a motor axis goes forwards from where it rests (20°).
+    fastest_deg_s : float, optional
+        Highest rate (60 °/s); of a brake 5 to 60 °/s.
     overrides : mapping, optional
         Values for dotted keys of the scenario.
 
@@ -235,7 +237,7 @@ def identify(
     ValueError
         A log of another plant than a brake or a motor, or of both; a table that cannot be read; a limit out of its
         range, or of a motor axis where there is none; `loaded` without `logs`, mass or radius, or the reverse; a mass
-        that is none.
+        that is none; `logs` without a log.
     OSError
         A file cannot be read or written.
 
@@ -247,7 +249,9 @@ def identify(
     True
     """
     checked = as_scenario(scenario, overrides)
-    files = [os.fspath(path) for path in logs]
+    files = [os.fspath(path) for path in logs or ()]
+    if logs is not None and not files:
+        raise ValueError("logs: expected at least one log, or None for an experiment on the simulated board")
     folder = None if log is None else os.fspath(log)
     heavier = _heavier([os.fspath(path) for path in loaded], mass_kg, radius_m, alone=bool(files))
     told = _clutch.identify(checked._native, files, columns, heavier, folder, travel_deg, fastest_deg_s)

@@ -43,6 +43,55 @@ fn the_truth_lies_between_the_bounds_on_every_disc() {
     assert!(all > 3_000.0 && sure > 1_000.0, "{sure} sure of {all}");
 }
 
+/// A motor turns a shaft round within a count, to and fro, and it never sticks: no voltage says that it surely did.
+#[test]
+fn a_motor_that_turns_a_shaft_round_within_a_count_is_no_sure_stick() {
+    let pd = |kp: f64, kd: f64| {
+        let gains = format!("law = {{ pd = {{ kp_v_rad = {kp:?}, kd_v_s_rad = {kd:?} }} }}\n");
+        ("law", gains.parse::<toml::Table>().unwrap()["law"].clone())
+    };
+    let ramp = |rate: f64| {
+        let path = format!("x = {{ ramp = {{ rate_deg_s = {rate:?} }} }}\n");
+        ("reference", path.parse::<toml::Table>().unwrap()["x"].clone())
+    };
+    let mut turned = 0;
+    for (gains, counts) in [(pd(5000.0, 50.0), 20_000), (pd(5000.0, 50.0), 2_000), (pd(800.0, 41.0), 2_000)] {
+        for rate in [5.0, 10.0, 20.0] {
+            let keys = [
+                gains.clone(),
+                ramp(rate),
+                ("rig.encoder.counts_per_rev", Value::Integer(counts)),
+                ("safety.limits.jump_deg", Value::Float(1.5)),
+                ("run.duration_s", Value::Float(5.0)),
+            ];
+            let run = run("motor_pid", rate, 1, &keys);
+            let [truth, least, most] = cycles(&run);
+            assert!(
+                least <= truth + 0.01 && truth <= most + 1.01,
+                "{rate} °/s: {truth} in {least} to {most}"
+            );
+            turned += usize::from(run.trace.velocity.iter().any(|v| *v < 0.0));
+        }
+    }
+    assert!(turned > 3, "{turned} runs turn round");
+}
+
+/// A silence that began before the settling time counts from there on.
+#[test]
+fn the_time_stuck_that_the_encoder_shows_is_no_more_than_the_whole() {
+    let hold = "x = { hold = {} }".parse::<toml::Table>().unwrap()["x"].clone();
+    let keys = [
+        ("law", hold),
+        ("run.start", Value::String("rest".to_owned())),
+        ("run.settle_s", Value::Float(0.2)),
+        ("run.duration_s", Value::Float(2.0)),
+    ];
+    for rate in [0.05, 0.1, 0.15, 0.5] {
+        let share = run("smc_2", rate, 1, &keys).detected.stick_time_fraction;
+        assert!((0.9..=1.0).contains(&share) || rate < 0.1 && share <= 1.0, "{rate} °/s: {share}");
+    }
+}
+
 #[test]
 fn a_stick_in_each_count_shows_no_silence_and_the_voltage_tells_it() {
     // Even edges, 36 ms apart, and a stick in every one of them.

@@ -123,7 +123,7 @@ impl Words {
         match kind {
             ActuatorKind::Brake => brake,
             ActuatorKind::Both => Words {
-                behind: "\nShaft behind: the motor drives it on (worst corner: weakest drive, weakest motor)",
+                behind: "\nShaft behind: the motor drives it on (worst: weakest drive, weakest motor)",
                 ..brake
             },
             ActuatorKind::Motor => Words {
@@ -141,7 +141,8 @@ type Row = (&'static str, String, &'static str);
 
 /// A value that is given in SI.
 fn row(name: &'static str, x: f64, unit: &Unit) -> Row {
-    (name, number(unit.from_si(x)), unit.text)
+    // Nothing is needed where no voltage is: no margin is a number.
+    (name, if x.is_finite() { number(unit.from_si(x)) } else { "–".to_owned() }, unit.text)
 }
 
 /// An interval, in SI.

@@ -88,7 +88,7 @@ pub(crate) struct Identify {
     /// Way that a motor axis may go forwards from where it rests, ° [default: 20].
     #[arg(long, value_name = "DEG", conflicts_with = "from")]
     travel: Option<f64>,
-    /// Highest rate of a motor axis, °/s [default: 60].
+    /// Highest rate, °/s: 5 to 60 with a brake [default: 60].
     #[arg(long, value_name = "DEG_S", conflicts_with = "from")]
     fastest: Option<f64>,
     /// Writes [model] and [bounds] for scenarios, with the intervals.
@@ -288,7 +288,7 @@ fn text(report: &Identified) -> String {
         if let Some(e) = row.finding.known() {
             let e = e.times(row.factor);
             let interval = format!("{} … {}", number(e.low), number(e.high));
-            let line = format!("  {:<26}{:>10}  {interval:<24}{}", row.label, number(e.value), row.unit);
+            let line = format!("  {:<26}{:>10}  {interval:<23} {}", row.label, number(e.value), row.unit);
             out += line.trim_end();
             out.push('\n');
         }
@@ -309,7 +309,7 @@ fn one_by_one(separate: &Separate) -> String {
         match finding {
             Finding::Known(e) => {
                 let interval = format!("{} … {}", number(e.low), number(e.high));
-                out += &format!("  {label:<26}{:>10}  {interval:<24}{unit}\n", number(e.value));
+                out += &format!("  {label:<26}{:>10}  {interval:<23} {unit}\n", number(e.value));
             }
             Finding::Refused(why) => out += &paragraph(&format!("{label}: not determined; {why}")),
         }

@@ -271,6 +271,9 @@ pub(crate) fn largest_errors(run: &Run) -> Vec<f64> {
 fn closely(scenario: &Scenario, run: &Run) -> String {
     let Some(window) = Window::of(scenario, run) else { return String::new() };
     let samples = window.samples(&run.trace);
+    if samples.len() < 2 {
+        return String::new();
+    }
     let errors = Envelope::new(&run.trace.time[samples.clone()], &run.trace.error[samples], BARS);
     let lowest = errors.mean.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = errors.mean.iter().copied().fold(f64::NEG_INFINITY, f64::max);

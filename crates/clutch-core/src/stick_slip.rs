@@ -76,6 +76,12 @@ impl<T: Real> StickSlipState<T> {
         self.stuck_ticks
     }
 
+    /// Ticks since the counts have moved.
+    #[must_use]
+    pub fn silent_ticks(&self) -> u32 {
+        self.silent_ticks
+    }
+
     /// Ticks seen.
     #[must_use]
     pub fn ticks(&self) -> u64 {

@@ -14,9 +14,9 @@ use crate::recording::Recording;
 use crate::ride;
 
 /// Conditions of a break-away.
-const RESTED: usize = 50; // samples
-const LONGEST: usize = 80; // samples
-const SILENT: usize = 14; // samples without an edge, after the first
+const RESTED: f64 = 0.05; // s
+const LONGEST: f64 = 0.08; // s, with 20 000 counts
+const SILENT: f64 = 0.014; // s without an edge, after the first, with 20 000 counts
 const FEWEST_COUNTS: i64 = 6;
 const MOST_COUNTS: i64 = 30;
 /// Slope of friction where a shaft rests, as a multiple of the ripple's.
@@ -66,14 +66,16 @@ pub fn break_aways(recording: &Recording) -> Vec<BreakAway<'_>> {
     let moved = |i: usize| ticks[i].counts != ticks[i - 1].counts;
     let mut found = Vec::new();
     let mut still = 0;
+    let resting = recording.samples(RESTED);
+    let [longest, silent] = [LONGEST, SILENT].map(|time| recording.samples(time * recording.coarse()));
     for i in 1..ticks.len() {
         if !moved(i) {
             still += 1;
             continue;
         }
-        let rested = std::mem::take(&mut still) >= RESTED;
+        let rested = std::mem::take(&mut still) >= resting;
         // Not let go, but let slip: a voltage that has fallen by little.
-        let before = &ticks[i.saturating_sub(RESTED)..i];
+        let before = &ticks[i.saturating_sub(resting)..i];
         let slowly = before.windows(2).all(|w| {
             let step = w[0].volts - w[1].volts;
             step.abs() <= (3.0 * recording.step_volts).max(0.01 * w[0].volts) && w[1].volts > 0.0
@@ -82,8 +84,8 @@ pub fn break_aways(recording: &Recording) -> Vec<BreakAway<'_>> {
             continue;
         }
         let mut end = i;
-        for j in i + 1..ticks.len().min(i + LONGEST) {
-            if ticks[j].counts < ticks[j - 1].counts || j - end > SILENT {
+        for j in i + 1..ticks.len().min(i + longest) {
+            if ticks[j].counts < ticks[j - 1].counts || j - end > silent {
                 break;
             }
             if moved(j) {
@@ -198,7 +200,9 @@ impl Profile {
         let crossing = |a: (f64, f64), b: (f64, f64)| a.0 + (b.0 - a.0) * (level - a.1) / (b.1 - a.1);
         let low = (first > 0).then(|| crossing(self.points[first - 1], self.points[first]));
         let high = self.points.get(last + 1).map(|&next| crossing(self.points[last], next));
-        (sums.1 / sums.0, low, high)
+        // Of a curve that falls off gently on one side the mean may lie beyond that end.
+        let mean = (sums.1 / sums.0).max(low.unwrap_or(f64::NEG_INFINITY)).min(high.unwrap_or(f64::INFINITY));
+        (mean, low, high)
     }
 }
 

@@ -9,6 +9,7 @@
 
 use crate::recording::{ReadError, Recording};
 use crate::release;
+use clutch_core::edge_timed::waves_for;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Real};
 use clutch_log::{LogWriter, Source};
@@ -64,7 +65,26 @@ const FOLLOWING_DEG: f64 = 6.0;
 /// Share of the speed limit with which a step of the path rises.
 const STEP_RATE: f64 = 0.8;
 
+/// Range of the highest rate of a ride, °/s.
+const FASTEST_DEG_S: (f64, f64) = (5.0, 60.0);
+
 impl Programme {
+    /// The programme whose rides are no faster, °/s.
+    ///
+    /// # Errors
+    /// A rate out of range.
+    pub fn within(fastest_deg_s: Option<f64>) -> Result<Self, ExperimentError> {
+        let (least, most) = FASTEST_DEG_S;
+        let value = fastest_deg_s.unwrap_or(most);
+        if !(least..=most).contains(&value) {
+            return Err(ExperimentError::Limit { key: "fastest", value, least, most, unit: "°/s" });
+        }
+        let mut programme = Programme::default();
+        programme.rides.iter_mut().for_each(|ride| ride.0 = ride.0.min(value));
+        programme.rides.dedup_by(|faster, ride| faster.0 <= ride.0);
+        Ok(programme)
+    }
+
     /// Its length, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
@@ -181,7 +201,8 @@ pub enum ExperimentError {
 pub type Runs<'a> = dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError> + 'a;
 
 /// For a part that a check ended.
-pub const REMEDY: &str = "Wider [bounds] help if they do not hold the rig; look at the rig first";
+pub const REMEDY: &str = "Look at the rig first. Wider [bounds] help if they do not hold it, and a lower --fastest (fastest_deg_s) if it \
+     gathers speed too slowly for a ride";
 
 /// Runs the programme, part by part; `run` makes one run of the loop, and says what was recorded. Later parts are given
 /// what earlier ones gave.
@@ -297,7 +318,12 @@ fn glide(
 ) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
     let delay = fall.map_or(0.0, |fall| (fall.delay.value / spec.period.seconds::<f64>()).round().min(3.0));
-    let law = table([("glide", table([("filter", table([("delay_ticks", Value::Integer(delay as i64))]))]))]);
+    let waves = waves_for(spec.rig.encoder.sensor.counts_per_rev);
+    let filter = table([
+        ("delay_ticks", Value::Integer(delay as i64)),
+        ("ripple_waves_per_turn", Value::Float(waves)),
+    ]);
+    let law = table([("glide", table([("filter", filter)]))]);
     let mut t = part(base, law, ramp(rate), seconds)?;
     if let (Some(fall), Some(Value::Table(model))) = (fall, t.get_mut("model")) {
         // Drive torque stays what it is believed to be: only their ratio is determined, and only it matters.

@@ -16,7 +16,7 @@ use clutch_sim::Scenario;
 pub struct Consent {
     /// Way of a motor axis to and fro, °.
     pub travel_deg: Option<f64>,
-    /// Highest rate of a motor axis, °/s.
+    /// Highest rate, °/s.
     pub fastest_deg_s: Option<f64>,
 }
 
@@ -36,10 +36,9 @@ impl Experiment {
     /// Limits out of their range, or of another rig than a motor axis.
     pub fn of(scenario: &Scenario, consent: &Consent) -> Result<Experiment, ExperimentError> {
         if scenario.spec().rig.actuator.kind() != ActuatorKind::Motor {
-            let given = [("travel", consent.travel_deg), ("fastest", consent.fastest_deg_s)];
-            return match given.into_iter().find(|(_, limit)| limit.is_some()) {
-                Some((key, _)) => Err(ExperimentError::OfMotors(key)),
-                None => Ok(Experiment::Brake(experiment::Programme::default())),
+            return match consent.travel_deg {
+                Some(_) => Err(ExperimentError::OfMotors("travel")),
+                None => experiment::Programme::within(consent.fastest_deg_s).map(Experiment::Brake),
             };
         }
         let own = motor::experiment::Programme::default();

@@ -70,6 +70,16 @@ pub enum ReadError {
 }
 
 impl Recording {
+    /// Samples in a time, s.
+    pub(crate) fn samples(&self, time: f64) -> usize {
+        (time / self.period).round().max(1.0) as usize
+    }
+
+    /// The times by which a shaft that sets off is later at an edge than with 20 000 counts, where there are fewer.
+    pub(crate) fn coarse(&self) -> f64 {
+        (20_000.0 / f64::from(self.counts_per_rev)).sqrt().max(1.0)
+    }
+
     /// A count, rad.
     #[must_use]
     pub fn radians_per_count(&self) -> f64 {

@@ -97,6 +97,17 @@ fn a_hidden_rig_is_found_and_what_a_log_does_not_show_is_refused() {
     assert!(refusal(&one_rate.stribeck).contains("break-aways"), "{one_rate:?}");
 }
 
+/// The filter of the rides takes waves of a ripple that the encoder sees.
+#[test]
+fn an_encoder_that_sees_no_short_wave_is_enough() {
+    let torque = 0.2094 * 9.81 * 0.024;
+    let hold = torque / (0.118 * 0.14);
+    let report = identify(&recordings(&[("rig.encoder.counts_per_rev", "5000")]));
+    assert_known(&report.pull, torque / 0.0014, 0.02 * torque / 0.0014);
+    let told = report.hold.known().expect("rides").value;
+    assert!((told - hold).abs() < 0.003 * hold, "{told} for {hold}");
+}
+
 #[test]
 fn a_count_that_no_fall_explains_is_named() {
     let all = recordings(&[]);

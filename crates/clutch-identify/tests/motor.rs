@@ -113,6 +113,27 @@ fn parts_tell_what_they_can(all: &[Recording]) {
     assert!(Identified::Motor(no_rides).rig_file(&truth(1).unwrap().scenario).is_err());
 }
 
+/// An axis that turns evenly, as the built-in one does.
+#[test]
+fn an_even_axis_keeps_its_truth_within_the_intervals_and_a_heavy_one_is_refused() {
+    let found = |set: &[(&str, f64)]| {
+        let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), format!("{value:?}"))).collect();
+        let scenario = Scenario::load(std::path::Path::new("motor_pid"), &set).unwrap();
+        let mut runner = PartRunner::default();
+        let experiment = Experiment::of(&scenario, &Consent::default()).unwrap();
+        of(&experiment.run(&scenario, &mut |name, part| runner.run(name, part)).unwrap())
+    };
+    for v_s in [0.0006, 0.002, 0.005] {
+        let report = found(&[("rig.friction.stribeck.stribeck_velocity_rad_s", v_s)]);
+        let _ = known(&report.viscous, 0.02, 0.001);
+        let stribeck = report.stribeck.known().expect("a fall");
+        assert!(stribeck.holds(v_s) && stribeck.holds(stribeck.value), "{v_s}: {stribeck:?}");
+    }
+    // Rides show no friction of it, and hops alone told 0.32 V s²/rad, within 0.00002.
+    let heavy = found(&[("rig.inertia_kg_m2", 0.01)]);
+    assert!(refusal(&heavy.inertia).contains("rides at even rates"), "{heavy:?}");
+}
+
 #[test]
 fn limits_are_held_and_bad_ones_named() {
     let truth = truth(10_003).unwrap();
@@ -128,6 +149,16 @@ fn limits_are_held_and_bad_ones_named() {
     let brake = Scenario::load(std::path::Path::new("board_smc_2"), &[]).unwrap();
     let consent = Consent { travel_deg: Some(30.0), fastest_deg_s: None };
     assert!(Experiment::of(&brake, &consent).unwrap_err().to_string().starts_with("travel: is a limit"));
+    let of_brake =
+        |fastest| Experiment::of(&brake, &Consent { travel_deg: None, fastest_deg_s: Some(fastest) });
+    let said = of_brake(61.0).unwrap_err().to_string();
+    assert_eq!(said, "fastest = 61 °/s: expected 5 to 60 °/s");
+    for (fastest, rates) in
+        [(60.0, &[5.0, 20.0, 60.0][..]), (30.0, &[5.0, 20.0, 30.0]), (20.0, &[5.0, 20.0]), (5.0, &[5.0])]
+    {
+        let Experiment::Brake(programme) = of_brake(fastest).unwrap() else { panic!("a brake") };
+        assert_eq!(programme.rides.iter().map(|ride| ride.0).collect::<Vec<_>>(), rates);
+    }
 
     // Nowhere does the shaft leave the way that was consented to by more than the law's own error.
     let mut runner = PartRunner::default();

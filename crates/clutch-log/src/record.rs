@@ -349,7 +349,7 @@ records! {
         5 code = code: u16, uint32, cycle.code.0;
         /// Voltage of the code, V.
         6 voltage_v = voltage: f64, double (optional), dac.volts(cycle.code).to_f64();
-        /// The law's output before limits, V.
+        /// Voltage that the law asks for within its limits, before converter and supervisor, V.
         7 demand_v = demand: f64, double (optional), of_law(cycle, |out| out.command.voltage);
         /// Target position, 2^-16 counts.
         8 target_counts_x65536 = target_fixed: i64, sint64, cycle.target.position.0;

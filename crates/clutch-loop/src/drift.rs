@@ -47,6 +47,8 @@ const MOST_LOST: u64 = 5;
 const STANDARD_ERRORS: f64 = 4.0;
 /// Share by which it may be off beside: delay and rounding.
 const RESOLUTION: f64 = 0.02;
+/// Friction over damping, below which it is no friction that determines the motion.
+const LEAST_FRICTION: f64 = 0.1;
 /// Share by which it is low with a ripple of 15 %, as the meter believes it: what is seen is the mean of the inverse.
 const INVERSE: f64 = 0.15 * 0.15;
 
@@ -131,16 +133,23 @@ impl DriftReport {
     pub fn words(&self) -> String {
         match &self.last {
             Some(last) => format!(
-                "{} of the model's, {} to {} in the run; bounds {} to {}, {}left{}",
+                "{} of the model's, {} to {} in the run; bounds {} {}, {}left{}",
                 number(last.friction),
                 number(self.range.0),
                 number(self.range.1),
                 number(last.low),
-                number(last.high),
+                if last.high.is_finite() {
+                    format!("to {}", number(last.high))
+                } else {
+                    "and more".to_owned()
+                },
                 if self.alarms > 0 { "" } else { "not " },
                 if self.one_sided == self.windows { "; sticks hide what is below" } else { "" }
             ),
-            None if self.has_friction => "not determined: too little motion without a stand".to_owned(),
+            None if self.has_friction => {
+                "not determined: too little motion without a stand, or hardly a friction beside the damping"
+                    .to_owned()
+            }
             None => "not determined: the model has no friction".to_owned(),
         }
     }
@@ -222,6 +231,8 @@ struct Sums {
     given: f64,
     given_low: f64,
     given_high: f64,
+    /// Damping of the model.
+    damping: f64,
     /// Friction of the model; that of the weakest and strongest plant within the bounds.
     friction: f64,
     weak: f64,
@@ -239,6 +250,7 @@ impl Sums {
         self.given += other.given;
         self.given_low += other.given_low;
         self.given_high += other.given_high;
+        self.damping += other.damping;
         self.friction += other.friction;
         self.weak += other.weak;
         self.strong += other.strong;
@@ -267,18 +279,19 @@ impl Window {
         self.taken.is_multiple_of(LONGER).then(|| std::mem::take(&mut self.whole))
     }
 
-    /// The mean, and what the bounds leave; none until there are enough slices, or if no pad has pressed.
-    fn mean(&self) -> Option<Seen> {
+    /// The mean, and what the bounds leave; none until there are enough slices, or if hardly a pad has pressed. `rounding`: how far
+    /// the gain of momentum may be off, N m and periods.
+    fn mean(&self, rounding: f64) -> Option<Seen> {
         let mut sums = Sums::default();
         self.slices.iter().for_each(|slice| sums.add(slice));
-        if self.taken < SLICES as u64 || sums.friction <= 0.0 {
+        if self.taken < SLICES as u64 || sums.friction <= LEAST_FRICTION * sums.damping {
             return None;
         }
         let friction = sums.given / sums.friction;
         let n = SLICES as f64;
         let spread: f64 = self.slices.iter().map(|s| (s.given - friction * s.friction).powi(2)).sum();
         let error = (spread * n / (n - 1.0)).sqrt() / sums.friction;
-        let off = STANDARD_ERRORS * error + RESOLUTION * friction.abs();
+        let off = STANDARD_ERRORS * error + RESOLUTION * friction.abs() + rounding / sums.friction;
         let sliding = sums.friction - sums.unsure;
         let let_go = (friction * sliding + sums.released) / sums.friction;
         let (weak, strong) = (sums.weak / sums.friction, sums.strong / sums.friction);
@@ -526,6 +539,7 @@ impl Drift {
             given: sign * (model.drive_torque * time + acted.motor) - model.viscous_damping * damped,
             given_low: drive.start() + motor.start() - b.viscous_damping.high * damped,
             given_high: drive.end() + motor.end() - b.viscous_damping.low * damped,
+            damping: model.viscous_damping * damped,
             friction: of_model,
             weak: mu * self.shares[0] * (pressed.start() + shared.start() + preload),
             strong: mu * self.shares[1] * (pressed.end() + shared.end() + preload),
@@ -567,11 +581,13 @@ impl Drift {
     /// A slice is complete: each window that it fills is judged.
     fn judge(&mut self, tick: u64, slice: Sums) -> Option<Alarm> {
         let (mut next, mut alarm) = (Some(slice), None);
+        // A count at either end of the window, over the periods of which a velocity is the mean.
+        let rounding = self.plant.params().inertia * self.per_inertia / AROUND as f64;
         for level in 0..LEVELS {
             let Some(slice) = next else { break };
             let window = &mut self.windows[level];
             next = window.take(slice);
-            let Some(seen) = window.mean() else { continue };
+            let Some(seen) = window.mean(rounding) else { continue };
             let report = &mut self.report;
             if level == 0 {
                 report.windows += 1;

@@ -43,6 +43,9 @@ pub enum NoRelease {
     /// The shaft moves already.
     #[error("the run begins in motion")]
     InMotion,
+    /// The pad never lifts.
+    #[error("output.lowest_v is above 0: the brake never lets go")]
+    NeverOpen,
     /// Nothing stops the shaft again.
     #[error("the safe state does not grip, or not at every corner of the bounds")]
     NoGrip,
@@ -145,6 +148,9 @@ impl Fall {
         }
         if spec.run.start != Start::Rest {
             return Err(NoRelease::InMotion);
+        }
+        if spec.output.lowest > 0.0 {
+            return Err(NoRelease::NeverOpen);
         }
         let volts =
             scenario.safety().ok().and_then(|s| s.on_fault.holding_voltage()).ok_or(NoRelease::NoGrip)?;

@@ -170,8 +170,11 @@ pub fn drift(log: &Log, scenario: &Scenario, report: Report<'_>) -> Result<Drift
     let plan = scenario.plan().map_err(BuildError::from)?;
     let mut detector = Detector::new(&scenario.spec(), Keep::Trace).map_err(BuildError::from)?;
     let mut drift = Drift::new(scenario, &plan.bounds)?;
+    // A simulated converter may give what it is asked for; a log has its code and the demand.
+    let exact = log.header.source == Source::Simulation && !scenario.spec().rig.dac.quantised;
     for (sample, command) in ticks(samples, report).zip(&log.commands) {
-        drift.watch_log(&mut detector, [(sample?, command)]);
+        let voltage = if exact { command.demand } else { command.voltage };
+        drift.watch_log(&mut detector, [(sample?, &CommandRecord { voltage, ..*command })]);
     }
     Ok(*drift.report())
 }

@@ -191,7 +191,10 @@ fn a_shaft_that_stands_tells_nothing() {
     let still = [("reference", "{ hold = {} }")];
     let (alarms, report) = run(&built_in("board_smc_2", &still), &["dac-scale:at=2,factor=1.5"]);
     assert!(alarms.is_empty() && report.windows == 0 && report.last.is_none());
-    assert_eq!(report.words(), "not determined: too little motion without a stand");
+    assert_eq!(
+        report.words(),
+        "not determined: too little motion without a stand, or hardly a friction beside the damping"
+    );
     assert_eq!(report.to_json()["last"], serde_json::Value::Null);
 }
 
@@ -218,6 +221,22 @@ fn a_motor_axis_is_watched_both_ways_and_one_without_friction_says_so() {
     let (alarms, report) = run(&built_in("motor_pid", &free), &[]);
     assert!(alarms.is_empty() && report.last.is_none());
     assert_eq!(report.words(), "not determined: the model has no friction");
+}
+
+/// Where damping decides the motion, friction is not determined by it.
+#[test]
+fn hardly_a_friction_beside_the_damping_tells_nothing() {
+    let actuator = "brake_gain_nm_v = 0.2684\nmotor_gain_nm_v = 0.04248\npreload_nm = 0.0\n";
+    let friction = "mu_dynamic = 0.15508\nmu_static = 0.15508\nstribeck_velocity_rad_s = 0.036066\nstribeck_exponent = 0.5\n";
+    let text = format!(
+        "name = \"free\"\n[rig]\nbase = \"paper\"\n[rig.actuator.both]\n{actuator}[rig.friction.stribeck]\n{friction}\
+         [rig.drive.weight]\nmass_kg = 4.247337e-6\n[model]\ndrive_torque_nm = 1e-6\n[model.actuator.both]\n{actuator}\
+         [model.friction.stribeck]\n{friction}[law.glide]\nkp_1_s = 20.19\n[velocity.edge_timed]\n[output]\nlowest_v = -10.0\n\
+         [reference.ramp]\nrate_deg_s = 13.667\n[bounds]\nfriction_percent = 5.0\n[run]\nduration_s = 16.0\nstart = \"on_path\"\n{SAFETY}"
+    );
+    let (alarms, report) = run(&Scenario::parse("free", &text, &[]).unwrap(), &[]);
+    // At the start alone the brake presses.
+    assert!(alarms.is_empty() && report.windows < 3, "{}: {alarms:?}", report.words());
 }
 
 #[test]

@@ -166,6 +166,14 @@ fn a_release_test_that_cannot_be_is_refused_only_if_it_was_asked_for() {
     let refusal = Session::new(motion.clone(), always).unwrap_err();
     assert_eq!(refusal.to_string(), "SMC at 2 °/s on a board: no release test: the run begins in motion");
     assert!(Session::new(motion, options()).is_ok());
+    let pressed = scenario("board_smc_2", &[("output.lowest_v", "0.1")]);
+    let always = SessionOptions { release: Release::Always, ..options() };
+    let refusal = Session::new(pressed.clone(), always).unwrap_err();
+    assert!(
+        refusal.to_string().ends_with("output.lowest_v is above 0: the brake never lets go"),
+        "{refusal}"
+    );
+    assert!(Session::new(pressed, options()).is_ok());
     for way in [0.0, -1.0, f64::NAN, 0.2] {
         let refusal =
             Session::new(scenario("board_smc_2", &[]), SessionOptions { release_way: way, ..options() });

@@ -91,6 +91,8 @@ pub struct Detector {
     from: u64,
     /// Cycles, periods stuck and stairs before it.
     before: (u64, u64, u64),
+    /// Periods before it of a silence that is not yet found to be a stick.
+    unheard: u64,
 }
 
 impl Detector {
@@ -120,6 +122,7 @@ impl Detector {
             settle,
             from: libm::ceil(settle / period - 1e-9) as u64,
             before: (0, 0, 0),
+            unheard: 0,
         })
     }
 
@@ -132,8 +135,15 @@ impl Detector {
         if let Some(gap) = &gap {
             self.tally.take(gap, self.from);
         }
+        let silent = u64::from(self.silent.silent_ticks());
         if (tick as f64) * self.period < self.settle {
             self.before = (self.silent.cycles(), self.silent.stuck_ticks(), self.climbing.cycles());
+            self.unheard = if self.silent.stuck() { 0 } else { silent };
+        } else if begins {
+            // What was silent before settling has been added with the rest.
+            self.before.1 += std::mem::take(&mut self.unheard);
+        } else if silent == 0 {
+            self.unheard = 0;
         }
         Noticed { begins, gap }
     }

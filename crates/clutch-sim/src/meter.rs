@@ -176,7 +176,9 @@ impl Meter {
         }
         let sign = f64::from(left.signum());
         self.tracks.iter_mut().for_each(Track::leave);
-        let sure = self.tracks.iter().all(|track| !self.slides(track, sign));
+        // A shaft that was turned round within a count, and back, did not slide all the way; nor did it stick.
+        let turned = self.tracks.iter().any(|track| track.turns[usize::from(sign < 0.0)]);
+        let sure = !turned && self.tracks.iter().all(|track| !self.slides(track, sign));
         // Apart from what it reads: filled anew for each friction, and cleared for none.
         let mut after = std::mem::take(&mut self.scratch);
         let possible = sure || self.tracks.iter().any(|track| self.stops(track, sign, &mut after));
@@ -362,6 +364,12 @@ fn least_of(tangents: [Tangent; 2], [low, high]: [f64; 2]) -> f64 {
     above(low).min(above(high)).min(between)
 }
 
+/// True if a pull could turn a shaft round that goes forwards, backwards.
+fn could_turn((pull, load): (f64, f64)) -> [bool; 2] {
+    let least = load / FRICTION_RANGE;
+    [-pull > least, pull > least]
+}
+
 /// A gap, as it was with one delay.
 #[derive(Clone, Debug)]
 struct Track {
@@ -380,6 +388,9 @@ struct Track {
     /// Pull and load of the period that entered the count.
     before: (f64, f64),
     acts: (f64, f64),
+    /// True if something could turn a shaft round that went forwards, backwards: it pulls harder the other way than the
+    /// least friction holds.
+    turns: [bool; 2],
 }
 
 /// A sample within a gap: what has come together since the gap began, and what acts from here on.
@@ -421,6 +432,7 @@ impl Track {
             inner: Point::default(),
             before: (0.0, 0.0),
             acts: (0.0, 0.0),
+            turns: [false; 2],
         }
     }
 
@@ -435,6 +447,7 @@ impl Track {
     fn enter(&mut self) {
         (self.used, self.stride, self.until) = (0, 1, 0);
         self.before = self.acts;
+        self.turns = could_turn(self.acts);
         self.now = Point::default();
         self.inner = Point::default();
     }
@@ -442,6 +455,8 @@ impl Track {
     /// A period passes.
     fn advance(&mut self, pull: f64, load: f64) {
         self.acts = (pull, load);
+        let [forwards, backwards] = could_turn(self.acts);
+        self.turns = [self.turns[0] | forwards, self.turns[1] | backwards];
         let x = &mut self.now;
         (x.pull, x.load) = (pull, load);
         self.inner = *x;

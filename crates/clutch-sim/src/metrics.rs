@@ -123,7 +123,7 @@ figures! {
         STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip", "cycles/s" shown as "cycles/s" SAME;
         /// Share of the time that the shaft was stuck.
         STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
-        /// Longest time in one stick, by the true motion.
+        /// Longest time in one stick, by the true motion; 0 without a stick.
         LONGEST_STICK longest_stick_s: Option<f64>, "longest stick", "s" shown as "ms" MILLI;
         /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
         STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;

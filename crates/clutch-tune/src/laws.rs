@@ -1,5 +1,6 @@
 //! Laws that are tried, and the gains of each candidate.
 
+use clutch_core::edge_timed::{EdgeTimedParams, waves_for};
 use clutch_core::friction::FrictionModel as _;
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
@@ -39,6 +40,8 @@ enum Told {
     Inertia,
     /// Rate below which micro-steps are taken, °/s.
     Steps,
+    /// Waves of the ripple that the encoder sees, where it does not see the default's.
+    Waves,
 }
 
 /// Unit of a gain's ends.
@@ -117,6 +120,7 @@ const GLIDE_GAINS: &[Gain] = &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law
 const RIPPLE: (&str, Told) = ("law.glide.filter.ripple_share", Told::Ripple);
 const LAG: (&str, Told) = ("law.glide.filter.lag_s", Told::Lag);
 const DELAY: (&str, Told) = ("law.glide.filter.delay_ticks", Told::Delay);
+const WAVES: (&str, Told) = ("law.glide.filter.ripple_waves_per_turn", Told::Waves);
 
 /// Key of the smoothing of (5).
 pub(crate) const SMOOTHING: &str = "velocity.smoothed_derivative.smoothing";
@@ -124,12 +128,18 @@ const SMOOTHED: Gain = plain(SMOOTHING, 0.2, 1.0);
 
 /// Every law that is tried. Ends were chosen so that the sets of docs/smooth.md and docs/certified.md lie within.
 pub(crate) const FAMILIES: [Family; 7] = [
-    Family { key: "glide", name: "glide", gains: GLIDE_GAINS, told: &[RIPPLE, LAG, DELAY], for_turns: false },
+    Family {
+        key: "glide",
+        name: "glide",
+        gains: GLIDE_GAINS,
+        told: &[RIPPLE, LAG, DELAY, WAVES],
+        for_turns: false,
+    },
     Family {
         key: "glide",
         name: "glide with micro-steps",
         gains: GLIDE_GAINS,
-        told: &[RIPPLE, LAG, DELAY, ("law.glide.micro_below_deg_s", Told::Steps)],
+        told: &[RIPPLE, LAG, DELAY, WAVES, ("law.glide.micro_below_deg_s", Told::Steps)],
         for_turns: true,
     },
     Family {
@@ -214,7 +224,7 @@ impl Told {
             Told::Friction => motor.then(|| sliding * actuator.preload() / per_torque),
             Told::Damping => Some(model.viscous_damping / per_torque),
             Told::Inertia => Some(model.inertia / per_torque),
-            Told::Ripple | Told::Lag | Told::Delay | Told::Steps => None,
+            Told::Ripple | Told::Lag | Told::Delay | Told::Steps | Told::Waves => None,
         }
     }
 
@@ -224,6 +234,10 @@ impl Told {
         Some(match self {
             Told::Ripple => Value::Float(rig.ripple.as_ref().map_or(0.03, |ripple| ripple.rms.max(0.03))),
             Told::Lag => Value::Float(rig.actuator_time_constant?),
+            Told::Waves => {
+                let waves = waves_for(rig.encoder.sensor.counts_per_rev);
+                (waves < EdgeTimedParams::<f64>::default().waves).then_some(Value::Float(waves))?
+            }
             Told::Delay => Value::Integer(rig.delay_ticks.min(3).into()),
             Told::Steps => {
                 Value::Float(STEPS_BELOW * 20_000.0 / f64::from(rig.encoder.sensor.counts_per_rev))

@@ -59,6 +59,13 @@ crate::params! {
     }
 }
 
+/// Waves of the ripple per turn for an encoder of so many counts: the default's, or the shortest that it sees.
+#[must_use]
+pub fn waves_for(counts_per_rev: u32) -> f64 {
+    let shortest = f64::from(counts_per_rev) / 20.0;
+    EdgeTimedParams::<f64>::default().waves.min(0.99 * shortest)
+}
+
 /// Standard deviation by which the end of a count is blurred where silence cuts the belief off, counts.
 const BLUR: f64 = 0.15;
 /// Time in which an edge has to come once the shaft was let go, s.

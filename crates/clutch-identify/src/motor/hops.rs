@@ -10,15 +10,15 @@ use crate::filter::{Belief, Shaft};
 use crate::recording::Recording;
 use crate::ride;
 
-/// Samples for which the shaft has to have rested before, and within which its voltage has to have jumped, by a share of it.
-const RESTED: usize = 30;
-const JUMPED: usize = 20;
+/// Time for which the shaft has to have rested before, s, and within which its voltage has to have jumped, by a share of it.
+const RESTED: f64 = 0.03;
+const JUMPED: f64 = 0.02;
 const JUMP: f64 = 0.3;
-/// Counts that a hop has at least, and samples at most.
+/// Counts that a hop has at least, and s at most.
 const FEWEST_COUNTS: i64 = 10;
-const LONGEST: usize = 150;
-/// Samples without an edge that end it: a shaft so slow has Stribeck's friction.
-const SILENT: usize = 5;
+const LONGEST: f64 = 0.15;
+/// Time without an edge that ends it, s, with 20 000 counts: a shaft so slow has Stribeck's friction.
+const SILENT: f64 = 0.005;
 /// Edges that are passed over at its beginning, for the same reason.
 const PASSED: usize = 2;
 /// K/J that is looked for at first, rad/s² per volt, and the number of values.
@@ -55,6 +55,8 @@ pub fn hops(recording: &Recording) -> Vec<Hop> {
     let ticks = &recording.ticks;
     let mut found = Vec::new();
     let (mut still, mut i) = (0, 1);
+    let [resting, jumping, longest] = [RESTED, JUMPED, LONGEST].map(|time| recording.samples(time));
+    let silent = recording.samples(SILENT * recording.coarse());
     while i < ticks.len() {
         let moved = ticks[i].counts - ticks[i - 1].counts;
         if moved == 0 {
@@ -62,19 +64,19 @@ pub fn hops(recording: &Recording) -> Vec<Hop> {
             i += 1;
             continue;
         }
-        let rested = std::mem::take(&mut still) >= RESTED;
+        let rested = std::mem::take(&mut still) >= resting;
         let volts = |k: usize| ticks[i.saturating_sub(k)].volts;
         let jumped =
-            (volts(1) - volts(JUMPED)).abs() > JUMP * volts(1).abs() && volts(1) * moved as f64 > 0.0;
+            (volts(1) - volts(jumping)).abs() > JUMP * volts(1).abs() && volts(1) * moved as f64 > 0.0;
         if !(rested && jumped) {
             i += 1;
             continue;
         }
         let way = moved.signum();
         let mut edges = vec![(i, ticks[i].counts)];
-        for j in i + 1..ticks.len().min(i + LONGEST) {
+        for j in i + 1..ticks.len().min(i + longest) {
             let step = (ticks[j].counts - ticks[j - 1].counts) * way;
-            if step < 0 || j - edges[edges.len() - 1].0 > SILENT {
+            if step < 0 || j - edges[edges.len() - 1].0 > silent {
                 break;
             }
             if step > 0 {
@@ -83,7 +85,7 @@ pub fn hops(recording: &Recording) -> Vec<Hop> {
         }
         let (end, last) = edges[edges.len() - 1];
         if (last - ticks[i].counts) * way >= FEWEST_COUNTS && edges.len() > PASSED + 4 {
-            let from = i - RESTED;
+            let from = i - resting;
             let mut recording = Recording {
                 volts_before: ticks[from].volts,
                 first_tick: recording.first_tick + from as u64,

@@ -6,9 +6,9 @@
 use crate::recording::Recording;
 use crate::ride::Place;
 
-/// Samples for which the shaft has to have rested before; samples in which it then goes so many counts.
-const RESTED: usize = 50;
-const SOON: usize = 60;
+/// Time for which the shaft has to have rested before, s; time in which it then goes so many counts, s.
+const RESTED: f64 = 0.05;
+const SOON: f64 = 0.06;
 const FEWEST_COUNTS: i64 = 4;
 /// Share of the voltage by which it may change in a period, in steps of the converter and in itself.
 const SLOWLY: (f64, f64) = (3.0, 0.01);
@@ -29,21 +29,22 @@ pub struct Slip {
 pub fn slips(recording: &Recording) -> Vec<Slip> {
     let ticks = &recording.ticks;
     let (mut found, mut still) = (Vec::new(), 0);
+    let [resting, soon] = [RESTED, SOON].map(|time| recording.samples(time));
     for i in 1..ticks.len() {
         let moved = ticks[i].counts - ticks[i - 1].counts;
         if moved == 0 {
             still += 1;
             continue;
         }
-        let rested = std::mem::take(&mut still) >= RESTED;
+        let rested = std::mem::take(&mut still) >= resting;
         if !rested || moved < 0 {
             continue;
         }
         let most = (SLOWLY.0 * recording.step_volts).max(SLOWLY.1 * ticks[i - 1].volts.abs());
-        let slowly = ticks[i - RESTED..i]
+        let slowly = ticks[i - resting..i]
             .windows(2)
             .all(|w| (-0.5 * most..=most).contains(&(w[1].volts - w[0].volts)) && w[1].volts > 0.0);
-        let goes = ticks[ticks.len().min(i + SOON) - 1].counts - ticks[i - 1].counts >= FEWEST_COUNTS;
+        let goes = ticks[ticks.len().min(i + soon) - 1].counts - ticks[i - 1].counts >= FEWEST_COUNTS;
         if slowly && goes {
             found.push(Slip { counts: ticks[i - 1].counts, tick: i });
         }

@@ -17,6 +17,8 @@ pub(super) struct Silence<V: Lane> {
     stuck_ticks: V,
     /// Cycles and ticks stuck before the run had settled.
     before: (V, V),
+    /// Ticks before that of a silence that is not yet found to be a stick.
+    unheard: V,
 }
 
 impl<V: Lane> Silence<V> {
@@ -31,6 +33,7 @@ impl<V: Lane> Silence<V> {
             cycles: V::ZERO,
             stuck_ticks: V::ZERO,
             before: (V::ZERO, V::ZERO),
+            unheard: V::ZERO,
         }
     }
 
@@ -45,6 +48,7 @@ impl<V: Lane> Silence<V> {
         let step = V::select(step.is_finite(), step, V::ZERO);
         self.path_moved = V::select(moved, V::ZERO, self.path_moved + step);
         self.stuck = lasts;
+        self.unheard = V::select(moved, V::ZERO, self.unheard);
         if V::any(still) {
             self.stuck_ticks = V::select(lasts, self.stuck_ticks + V::ONE, self.stuck_ticks);
             let long = self.ticks.less_or_equal(self.silent_ticks);
@@ -52,9 +56,13 @@ impl<V: Lane> Silence<V> {
             self.cycles = V::select(begins, self.cycles + V::ONE, self.cycles);
             self.stuck_ticks = V::select(begins, self.stuck_ticks + self.silent_ticks, self.stuck_ticks);
             self.stuck = lasts | begins;
+            // What was silent before settling has been added with the rest.
+            self.before.1 = V::select(begins, self.before.1 + self.unheard, self.before.1);
+            self.unheard = V::select(begins, V::ZERO, self.unheard);
         }
         if !settled {
             self.before = (self.cycles, self.stuck_ticks);
+            self.unheard = V::select(self.stuck, V::ZERO, self.silent_ticks);
         }
     }
 

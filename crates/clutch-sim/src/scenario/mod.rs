@@ -690,6 +690,10 @@ impl Scenario {
                         available.to_degrees(),
                         if bounds.actuator == ActuatorKind::Brake { "brake" } else { "both" }
                     ),
+                    Obstacle::Acceleration if available <= 0.0 => format!(
+                        "{at_time}: damping takes more than the drive gives, which grants {:.5} °/s²; go more slowly, lower viscous_damping_nm_s_rad of model and rig, or give rig.drive and model.drive_torque_nm more torque",
+                        available.to_degrees()
+                    ),
                     Obstacle::Acceleration => format!(
                         "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly, give rig.drive and model.drive_torque_nm more torque, or give rig and model a motor",
                         asked.to_degrees(),
