@@ -15,11 +15,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 struct Run {
     image: &'static str,
     law: &'static str,
-    set: &'static [(&'static str, &'static str)],
+    set: Pairs,
     /// True if it is counted to its end; else while it goes on.
     ends: bool,
     /// Rows of firmware/budget.toml that it measures, by `measured`, and what of it.
-    rows: &'static [(&'static str, &'static str)],
+    rows: Pairs,
 }
 
 const CONTROLLER: &str = "nucleo-controller";
@@ -35,20 +35,16 @@ const PERIOD: &str = "period";
 const SERVO: &str = "servo";
 const LAWS: &[(&str, &str)] = &[("code", CODE), ("goes_on", PERIOD), ("servo", SERVO)];
 
-const fn goes_on(
-    law: &'static str,
-    set: &'static [(&'static str, &'static str)],
-    rows: &'static [(&'static str, &'static str)],
-) -> Run {
+type Pairs = &'static [(&'static str, &'static str)];
+
+/// A run of the controller that is counted while it goes on.
+const fn goes_on(law: &'static str, set: Pairs, rows: Pairs) -> Run {
     Run { image: CONTROLLER, law, set, ends: false, rows }
 }
 
-const fn ends(
-    law: &'static str,
-    set: &'static [(&'static str, &'static str)],
-    rows: &'static [(&'static str, &'static str)],
-) -> Run {
-    Run { image: CONTROLLER, law, set, ends: true, rows }
+/// One that is counted to its end.
+const fn ends(law: &'static str, set: Pairs, rows: Pairs) -> Run {
+    Run { ends: true, ..goes_on(law, set, rows) }
 }
 
 const RUNS: [Run; 14] = [
@@ -71,13 +67,7 @@ const RUNS: [Run; 14] = [
         image: "nucleo-daq-read-back",
         ..ends("smc", &[], &[("daq_code_read_back", CODE), ("daq_any_read_back", PERIOD)])
     },
-    Run {
-        image: "nucleo-daq",
-        law: "smc",
-        set: &[],
-        ends: true,
-        rows: &[("daq_code", CODE), ("daq_any", PERIOD)],
-    },
+    Run { image: "nucleo-daq", ..ends("smc", &[], &[("daq_code", CODE), ("daq_any", PERIOD)]) },
 ];
 
 /// Counts by the names of rows.

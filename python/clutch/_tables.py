@@ -591,11 +591,11 @@ class StribeckFriction(_mixins.Friction):
     Parameters
     ----------
     mu_static : float, default 0.2
-        Coefficient of friction at rest, in (2). `μ_s`: a finite number of at least 0; a number above 0 in the
-        model, and with a brake in the rig: computed torque and bounds divide by it.
+        Coefficient of friction at rest, in (2). `μ_s`: a finite number of at least 0; a number above 0 in
+        model.friction, and with a brake in rig.friction: computed torque and bounds divide by it.
     mu_dynamic : float, default 0.15
         Coefficient of friction of a fast shaft, in (2). `μ_d`: a finite number of at least 0; a number above
-        0 in the model, and with a brake in the rig: computed torque and bounds divide by it.
+        0 in model.friction, and with a brake in rig.friction: computed torque and bounds divide by it.
     stribeck_velocity_rad_s : float, default 0.001
         Stribeck velocity in (2), at which all but 1/e of the drop from `μ_s` to `μ_d` is done. `θ̇_s`: a
         finite number above 0 rad/s whose inverse is finite, too.
@@ -633,8 +633,8 @@ class CoulombFriction(_mixins.Friction):
         Coefficient of friction at rest. `μ_s`: a finite number of at least 0; a number of at least
         mu_dynamic.
     mu_dynamic : float, default 0.15
-        Coefficient of friction in motion. `μ_d`: a finite number of at least 0; a number above 0 in the
-        model, and with a brake in the rig: computed torque and bounds divide by it.
+        Coefficient of friction in motion. `μ_d`: a finite number of at least 0; a number above 0 in
+        model.friction, and with a brake in rig.friction: computed torque and bounds divide by it.
 
     Raises
     ------

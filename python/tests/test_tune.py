@@ -51,8 +51,12 @@ def test_a_motor_axis_is_identified_within_its_limits():
     assert len(left.get_yticklabels()) == len(told) and len(right.lines) == 1
     with pytest.raises(ValueError, match="travel = 3 °: expected 10 to 3600 °"):
         clutch.identify("motor_pid", travel_deg=3)
-    with pytest.raises(ValueError, match="fastest: is a limit"):
-        clutch.identify("board_smc_2", fastest_deg_s=30)
+    with pytest.raises(ValueError, match="travel: is a limit"):
+        clutch.identify("board_smc_2", travel_deg=30)
+    with pytest.raises(ValueError, match="fastest = 61 °/s: expected 5 to 60 °/s"):
+        clutch.identify("board_smc_2", fastest_deg_s=61)
+    with pytest.raises(ValueError, match="logs: expected at least one log"):
+        clutch.identify("board_smc_2", logs=[])
 
 
 def test_a_known_mass_tells_torque_and_inertia_one_by_one(tmp_path):

@@ -72,7 +72,7 @@ pub enum ReadError {
 impl Recording {
     /// Samples in a time, s.
     pub(crate) fn samples(&self, time: f64) -> usize {
-        (time / self.period).round().max(1.0) as usize
+        (time / self.period).round().clamp(1.0, 1e9) as usize
     }
 
     /// The times by which a shaft that sets off is later at an edge than with 20 000 counts, where there are fewer.

@@ -176,7 +176,7 @@ impl Meter {
         }
         let sign = f64::from(left.signum());
         self.tracks.iter_mut().for_each(Track::leave);
-        // A shaft that was turned round within a count, and back, did not slide all the way; nor did it stick.
+        // A shaft that can have been turned round within a count, and back, need not have stuck.
         let turned = self.tracks.iter().any(|track| track.turns[usize::from(sign < 0.0)]);
         let sure = !turned && self.tracks.iter().all(|track| !self.slides(track, sign));
         // Apart from what it reads: filled anew for each friction, and cleared for none.

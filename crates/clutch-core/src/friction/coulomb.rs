@@ -24,7 +24,7 @@ crate::params! {
         /// A shaft that moves does not stop below what holds it.
         HOLDS: mu_static, "a number of at least mu_dynamic" => p.mu_static >= p.mu_dynamic;
         /// Something divides by the friction of a moving shaft.
-        DIVIDES: mu_dynamic, "a number above 0 in the model, and with a brake in the rig: computed torque and bounds divide by it";
+        DIVIDES: mu_dynamic, "a number above 0 in model.friction, and with a brake in rig.friction: computed torque and bounds divide by it";
     }
 }
 

@@ -25,9 +25,9 @@ crate::params! {
     }
     relations(p) {
         /// Something divides by the friction at rest.
-        STATIC_DIVIDES: mu_static, "a number above 0 in the model, and with a brake in the rig: computed torque and bounds divide by it";
+        STATIC_DIVIDES: mu_static, "a number above 0 in model.friction, and with a brake in rig.friction: computed torque and bounds divide by it";
         /// Something divides by the friction of a fast shaft.
-        DYNAMIC_DIVIDES: mu_dynamic, "a number above 0 in the model, and with a brake in the rig: computed torque and bounds divide by it";
+        DYNAMIC_DIVIDES: mu_dynamic, "a number above 0 in model.friction, and with a brake in rig.friction: computed torque and bounds divide by it";
     }
 }
 
