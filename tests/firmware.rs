@@ -23,8 +23,7 @@ static PICO: LazyLock<Result<PathBuf, &str>> =
     LazyLock::new(|| modelled("clutch-pico-rp2040", CORTEX_M0_PLUS));
 
 fn modelled(package: &str, target: &str) -> Result<PathBuf, &'static str> {
-    let python = std::env::var_os("CLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
-    if !Command::new(python).args(["-c", "import unicorn"]).output().is_ok_and(|o| o.status.success()) {
+    if clutch_loop::chip_board::no_engine().is_some() {
         return Err(
             "no Python with the module unicorn (pip install unicorn; CLUTCH_PYTHON names the interpreter)",
         );

@@ -7,7 +7,6 @@ use clutch_loop::lockstep_session::LockstepOptions;
 use clutch_sim::Scenario;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -24,6 +23,8 @@ struct Run {
 
 const CONTROLLER: &str = "nucleo-controller";
 const DURATION_S: f64 = 0.4;
+/// The rig that the images are made for.
+const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/nucleo_smc_2.toml");
 const TABLE: &[(&str, &str)] = &[(
     "reference",
     "{ table = { interpolation = \"cubic\", points_s_deg = [[0.0, 0.0], [0.1, 0.2], [0.2, 0.45], [0.4, 0.8]] } }",
@@ -73,15 +74,6 @@ const RUNS: [Run; 14] = [
 /// Counts by the names of rows.
 pub(crate) type OnChip = BTreeMap<&'static str, Counts>;
 
-/// A message if the model of the chip cannot run.
-pub(crate) fn no_model() -> Option<String> {
-    let python = std::env::var_os("CLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
-    let there =
-        Command::new(&python).args(["-c", "import unicorn"]).output().is_ok_and(|o| o.status.success());
-    let why = "has no module unicorn, on which the flashed images are measured: CLUTCH_PYTHON names another";
-    (!there).then(|| format!("{} {why}", python.display()))
-}
-
 /// Makes the runs with the images of a folder.
 pub(crate) fn measure(images: &Path) -> Result<OnChip> {
     let (next, counted) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
@@ -105,32 +97,22 @@ pub(crate) fn measure(images: &Path) -> Result<OnChip> {
 
 impl Run {
     fn count(&self, images: &Path) -> Result<Counted> {
-        let text = format!(
-            "name = \"budget\"\n[rig]\nbase = \"paper\"\nencoder.counts_per_rev = 20000\ndac.bits = 12\n\
-             dac.lowest_v = 0.0\ndac.highest_v = 10.0\n[law.{}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
-             [sampling]\nscalar = \"f32\"\n[run]\nduration_s = {DURATION_S:?}\nsettle_s = 0.1\nstart = \"rest\"\n\
-             [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 4.5\n\
-             [safety.limits]\nfollowing_error_deg = 5.0\n",
-            self.law
-        );
-        let set: Vec<_> =
-            self.set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-        let scenario = Scenario::parse("budget", &text, &set)?;
+        let of_run = [
+            ("law", format!("{{ {} = {{}} }}", self.law)),
+            ("run.duration_s", DURATION_S.to_string()),
+            ("run.settle_s", "0.1".to_owned()),
+            ("safety.limits.following_error_deg", "5.0".to_owned()),
+        ];
+        let more = self.set.iter().map(|(key, value)| (*key, (*value).to_owned()));
+        let set = of_run.into_iter().chain(more).map(|(key, value)| (key.to_owned(), value));
+        let scenario = Scenario::load(Path::new(SCENARIO), &set.collect::<Vec<_>>())?;
         let file = std::env::temp_dir().join(format!("clutch-budget-{}-{self:p}.json", std::process::id()));
         let chip = ChipOptions {
             count: Some(file.clone()),
             until: (!self.ends).then_some(DURATION_S - 0.05),
             ..ChipOptions::default()
         };
-        let options = LockstepOptions {
-            log: None,
-            uncertified: true,
-            faults: Vec::new(),
-            seed: 1,
-            latency_ns: 0,
-            silence: None,
-            version: String::new(),
-        };
+        let options = LockstepOptions { uncertified: true, seed: 1, ..LockstepOptions::default() };
         let image = images.join(self.image);
         let report = ChipSession::new(scenario, options, chip, ChipRole::of(&image))?.run(&image)?;
         std::fs::remove_file(&file)?;

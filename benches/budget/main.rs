@@ -109,8 +109,8 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         Some(why) => skipped(&why).map(|()| None)?,
         None => Some(emulator::measure(&path)?),
     };
-    let on_chip = match chip::no_model() {
-        Some(why) => skipped(&why).map(|()| None)?,
+    let on_chip = match clutch_loop::chip_board::no_engine() {
+        Some(why) => skipped(&why.to_string()).map(|()| None)?,
         None => Some(chip::measure(&flashed)?),
     };
     if let Some(why) = no_gcc {

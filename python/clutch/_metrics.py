@@ -27,11 +27,11 @@ class Metrics:
     stick_time_fraction : float
         Share of the time that the shaft was stuck.
     longest_stick_s : float or None
-        Longest time in one stick, by the true motion; 0 without a stick, s; None if nothing to tell.
+        Longest time in one stick, by the true motion; 0 without a stick, s; None if unknown.
     stair_height_rad : float
         Stair height: largest movement between one stick and the next, 0 with fewer than two, rad.
     break_away_torque_nm : float or None
-        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if nothing to tell.
+        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if unknown.
     control_variation_v_s : float
         Total variation of the voltage, per time, V/s.
     jerk_rms_rad_s3 : float
@@ -43,11 +43,11 @@ class Metrics:
     detected_stairs_per_s : float
         Stairs: silences in which the shaft fell a count or more behind even motion, 1/s.
     detected_least_cycles_per_s : float or None
-        Least stick-slip cycles with which counts and voltage agree, cycles/s; None if nothing to tell.
+        Least stick-slip cycles with which counts and voltage agree, cycles/s; None if unknown.
     detected_most_cycles_per_s : float or None
-        Most stick-slip cycles with which counts and voltage agree, cycles/s; None if nothing to tell.
+        Most stick-slip cycles with which counts and voltage agree, cycles/s; None if unknown.
     detected_told_cycles_per_s : float or None
-        Stick-slip cycles, if least and most are within 20 % and two cycles, cycles/s; None if nothing to tell.
+        Stick-slip cycles, if least and most are within 20 % and two cycles, cycles/s; None if unknown.
 
     Examples
     --------

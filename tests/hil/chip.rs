@@ -53,15 +53,7 @@ fn scenario(law: &str, duration: f64) -> Scenario {
 }
 
 fn session(scenario: &Scenario, role: ChipRole, chip: ChipOptions) -> ChipSession {
-    let options = LockstepOptions {
-        log: None,
-        uncertified: true,
-        faults: Vec::new(),
-        seed: 1,
-        latency_ns: 0,
-        silence: None,
-        version: String::new(),
-    };
+    let options = LockstepOptions { uncertified: true, seed: 1, ..LockstepOptions::default() };
     ChipSession::new(scenario.clone(), options, chip, role).expect("a session")
 }
 

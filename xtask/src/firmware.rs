@@ -119,8 +119,8 @@ fn build_one(board: (&str, &str)) -> Result<()> {
 /// The places that keep a board's images from being linked because they call for a panic; nothing, if they are kept by another
 /// error.
 pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
-    let named = "../target/firmware_named";
-    let image = panic_path::in_spite(image((board, target)), target).args(["--target-dir", named]);
+    let named = root().join("target/firmware_named");
+    let image = panic_path::in_spite(image((board, target)), target).arg("--target-dir").arg(&named);
     let (built, _) = image.silently()?;
     if !built {
         return Ok(String::new());
@@ -129,7 +129,7 @@ pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
         return Ok(why);
     }
     let mut places = String::new();
-    for file in std::fs::read_dir(root().join("target/firmware_named").join(target).join("release"))? {
+    for file in std::fs::read_dir(named.join(target).join("release"))? {
         let path = file?.path();
         if path.is_file() && std::fs::read(&path)?.starts_with(b"\x7fELF") {
             places += &panic_path::of_image(&path)?.unwrap_or_default();

@@ -16,8 +16,8 @@ use clutch_log::{Header, LogWriter, Source};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
-/// Options of a session in lockstep.
-#[derive(Clone, Debug)]
+/// Options of a session in lockstep; by default gains have to be certified, and nothing goes wrong.
+#[derive(Clone, Debug, Default)]
 pub struct LockstepOptions {
     /// A new file for a log, with the shaft's true motion.
     pub log: Option<PathBuf>,

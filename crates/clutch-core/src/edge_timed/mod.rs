@@ -59,10 +59,13 @@ crate::params! {
     }
 }
 
+/// Counts that a wave of the ripple has to have, more than these.
+const COUNTS_PER_WAVE: i32 = 20;
+
 /// Waves of the ripple per turn for an encoder of so many counts: the default's, or the shortest that it sees.
 #[must_use]
 pub fn waves_for(counts_per_rev: u32) -> f64 {
-    let shortest = f64::from(counts_per_rev) / 20.0;
+    let shortest = f64::from(counts_per_rev) / f64::from(COUNTS_PER_WAVE);
     EdgeTimedParams::<f64>::default().waves.min(0.99 * shortest)
 }
 
@@ -249,7 +252,7 @@ impl<T: Real> EdgeTimed<T> {
     ) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
         let seconds = period.period::<T>()?;
-        let twentieth = T::from_u64(u64::from(encoder.counts_per_rev())) / T::from_i32(20);
+        let twentieth = T::from_u64(u64::from(encoder.counts_per_rev())) / T::from_i32(COUNTS_PER_WAVE);
         EdgeTimedParams::RESOLVED.require(p.waves, p.waves < twentieth)?;
         EdgeTimedParams::LAG_COUNTED.require(p.lag, p.lag < T::from_i32(1000) * seconds)?;
         let model = plant.params();

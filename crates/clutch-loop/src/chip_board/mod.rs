@@ -16,7 +16,7 @@ mod session;
 
 pub use faults::{ChipFault, ChipFaultError, ChipFaultKind};
 pub use kind::ChipKind;
-pub use process::{ChipError, Counted, MODULE};
+pub use process::{ChipError, Counted, MODULE, no_engine};
 pub use session::{ChipOptions, ChipReport, ChipRole, ChipSession};
 
 use crate::from_scenario;

@@ -142,6 +142,22 @@ fn writable(file: &Path) -> std::io::Result<()> {
 /// Numbers of instructions, as JSON.
 pub type Counted = serde_json::Value;
 
+/// The interpreter of the models.
+fn interpreter() -> String {
+    std::env::var(INTERPRETER).unwrap_or_else(|_| "python3".to_owned())
+}
+
+/// The reason why no model of a chip runs on this machine: no interpreter, or none with the engine.
+#[must_use]
+pub fn no_engine() -> Option<ChipError> {
+    let program = interpreter();
+    match Command::new(&program).args(["-c", &format!("import {MODULE}")]).output() {
+        Ok(asked) if asked.status.success() => None,
+        Ok(_) => Some(ChipError::NoModule { program }),
+        Err(_) => Some(ChipError::NoPython { program }),
+    }
+}
+
 /// The process.
 pub(super) struct Chip {
     child: Child,
@@ -159,7 +175,7 @@ impl Chip {
             return Err(ChipError::NoFault { fault: fault.kind.name(), chip: kind.name() });
         }
         let image = image.canonicalize().map_err(|_| ChipError::NoImage { path: image.to_owned() })?;
-        let program = std::env::var(INTERPRETER).unwrap_or_else(|_| "python3".to_owned());
+        let program = interpreter();
         let mut command = Command::new(&program);
         // -P: a file in the working directory is no module.
         command.args(["-P", "-c", LOADER, CORE, kind.model()]).arg(image);

@@ -41,7 +41,7 @@ pub(crate) fn python() -> String {
         let (in_words, annotation) =
             if r.optional { ("float or None", "float | None") } else { ("float", "float") };
         let unit = if r.unit == "1" { String::new() } else { format!(", {}", r.unit) };
-        let none = if r.optional { "; None if nothing to tell" } else { "" };
+        let none = if r.optional { "; None if unknown" } else { "" };
         let meaning = r.meaning.trim_end_matches('.');
         let _ = write!(attributes, "    {} : {in_words}\n        {meaning}{unit}{none}.\n", r.name);
         let _ = writeln!(fields, "    {}: {annotation}", r.name);
@@ -98,7 +98,7 @@ pub(crate) fn page(old: &str) -> Option<String> {
     let mut table = "| field | unit | meaning |\n|---|---|---|\n".to_owned();
     for r in rows() {
         let unit = if r.unit == "1" { "–" } else { r.unit };
-        let none = if r.optional { "; `null` if nothing to tell" } else { "" };
+        let none = if r.optional { "; `null` if unknown" } else { "" };
         let _ = writeln!(table, "| `{}` | {unit} | {}{none} |", r.json, r.meaning.trim_end_matches('.'));
     }
     Some(format!("{head}{begin}{table}{end}{tail}"))
