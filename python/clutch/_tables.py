@@ -19,6 +19,7 @@ __all__ = [
     "Chirp",
     "ChirpDrive",
     "CoulombFriction",
+    "CountsOverTime",
     "Ctc",
     "Dac",
     "DahlFriction",
@@ -345,6 +346,7 @@ KEYS = {
     "law.voltage.returns": "",
     "law.hold.margin": "",
     "velocity.smoothed_derivative.smoothing": "",
+    "velocity.counts_over_time.least_time_s": "s",
     "velocity.edge_timed.delay_ticks": "periods",
     "velocity.edge_timed.lag_s": "s",
     "velocity.edge_timed.friction_doubt": "",
@@ -1937,6 +1939,34 @@ class SmoothedDerivative(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class CountsOverTime(_Params):
+    """Counts over the time between edges of the encoder, the M/T method of drives: from edge to edge where
+    the shaft is slow, over the counts of some time where it is fast, and no more than a count since the last
+    edge in silence.
+
+    Parameters
+    ----------
+    least_time_s : float, default 0.002
+        Least time over which counts are taken. Longer is smoother and later. `t_g`: a number from 0 to 10 s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.CountsOverTime().least_time_s
+    0.002
+    """
+
+    _key: ClassVar[str] = "velocity.counts_over_time"
+
+    least_time_s: float = 0.002
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Observer(_Params):
     """A stationary Kalman filter for position, velocity and the torque that nobody measures. It predicts with
     the model.
@@ -1966,7 +1996,7 @@ class Observer(_Params):
     disturbance_walk_nm_rt_s: float = 0.1
 
 
-Velocity = SmoothedDerivative | EdgeTimed | Observer
+Velocity = SmoothedDerivative | CountsOverTime | EdgeTimed | Observer
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -2745,7 +2775,7 @@ class _Scenario(_Params):
         The shaft as law, observer and certificate believe it to be. By default `Model()`.
     law : Pd, Ctc, Smc, SmcSign, Pid, SuperTwisting, SmcIntegral, Dob, Glide, Voltage or HoldLaw
         The law and its gains.
-    velocity : SmoothedDerivative, EdgeTimed or Observer
+    velocity : SmoothedDerivative, CountsOverTime, EdgeTimed or Observer
         Source of the velocity that the law is given. By default `SmoothedDerivative()`.
     output : Output
         Limits of the voltage, bumpless start. By default `Output()`.

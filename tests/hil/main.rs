@@ -120,7 +120,7 @@ fn motors_on_the_board_are_the_simulation_bit_for_bit() {
     let Some(image) = image("mps2-controller") else { return };
     let _beside = beside();
     let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
-    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"] {
         let in_f32 = [set("sampling.scalar", "f32"), set("safety.limits.deadline_us", "1000000")];
         let scenario = Scenario::load(name.as_ref(), &in_f32).expect("a scenario");
         let simulated = simulate(&scenario);

@@ -7,7 +7,7 @@ use clutch_core::law::{
 };
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
-use clutch_core::{ObserverParams, SmoothedDerivativeParams, VelocityParams};
+use clutch_core::{CountsOverTimeParams, ObserverParams, SmoothedDerivativeParams, VelocityParams};
 use clutch_sim::{RigParams, RunSpec, simulate};
 use proptest::prelude::*;
 
@@ -79,6 +79,7 @@ fn every_law_follows_with_each_velocity_source_in_either_scalar() {
     for law in LawParams::all().into_iter().filter(LawParams::follows) {
         for velocity in [
             VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default()),
+            VelocityParams::CountsOverTime(CountsOverTimeParams::default()),
             VelocityParams::EdgeTimed(EdgeTimedParams::default()),
             VelocityParams::Observer(ObserverParams::default()),
         ] {

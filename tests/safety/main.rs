@@ -140,7 +140,7 @@ fn without_latency_the_loop_is_the_simulation_bit_for_bit() {
             let scenario = Scenario::parse("equal", &text, &[]).expect("a scenario");
             equal(&scenario, &format!("{law}, {scalar}"));
         }
-        for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+        for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"] {
             // With the first reversal.
             let set = [
                 ("sampling.scalar", scalar),
@@ -267,7 +267,7 @@ fn motor(name: &str, set: &[(&str, String)], faults: Vec<Fault>) -> Option<Cause
 
 #[test]
 fn a_sound_motor_axis_with_any_friction_and_load_ends_without_a_fault() {
-    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"] {
         for preload in [0.0, 0.01, 0.1, 0.25] {
             for load in [0.0, 0.01, -0.01] {
                 for start in ["rest", "on_path"] {
@@ -291,7 +291,7 @@ fn a_sound_motor_axis_with_any_friction_and_load_ends_without_a_fault() {
 
 #[test]
 fn a_frozen_encoder_of_a_motor_axis_ends_control_before_the_axis_has_gone_far() {
-    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"] {
         for at in [1.0, 3.0, 6.5] {
             let cause = motor(name, &[], vec![Fault::new(FaultKind::EncoderFreeze, at)]);
             let seen = matches!(cause, Some(Cause::StandStill | Cause::FollowingError));

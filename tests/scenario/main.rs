@@ -41,7 +41,8 @@ fn every_built_in_scenario_is_good_and_runs() {
         let s = Scenario::built_in(b.name).unwrap().unwrap_or_else(|e| panic!("{e}"));
         let run = s.run(Keep::Trace, UNWATCHED).unwrap_or_else(|e| panic!("{e}"));
         assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
-        // CTC saturates too far off its surface; PID and glide have none: docs/theory.md.
+        // CTC saturates too far off its surface; laws with an integral, or with an estimate of their own, have none:
+        // docs/theory.md. The shell is so wide that beyond it neither brake nor drive follows in continuous time.
         let certified = !matches!(
             b.name,
             "ctc_2"
@@ -51,6 +52,11 @@ fn every_built_in_scenario_is_good_and_runs() {
                 | "motor_pid_coulomb"
                 | "slide_pid"
                 | "bench_glide_2"
+                | "bench_dob_2"
+                | "bench_smc_integral_2"
+                | "bench_super_twisting_2"
+                | "motor_glide"
+                | "shell_glide_2"
         );
         assert_eq!(s.plan().unwrap().certificate.certified(), certified, "{}", b.name);
     }

@@ -7,7 +7,7 @@
 //! | [`law`] | PD (4), CTC (11), SMC (29) and (31): parameters → law → state |
 //! | [`Servo`] | encoder counts and target in, DAC code and terms out |
 //! | [`Stribeck`], [`Actuator`], [`Plant`] | friction (2), brake or motor, and the shaft (1) |
-//! | [`SmoothedDerivative`], [`edge_timed`], `Observer` | where the velocity comes from |
+//! | [`SmoothedDerivative`], `CountsOverTime`, [`edge_timed`], `Observer` | where the velocity comes from |
 //! | [`reference`](mod@reference) | planned paths in fixed-point counts |
 //! | [`check_path`] | whether a brake can follow a path |
 //! | [`certificate`] | what gains guarantee over all plants within [`Bounds`] |
@@ -16,7 +16,7 @@
 //!
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
 //! every target for one scalar type. Features: `linalg` (velocity sources that
-//! no board has: the observer, on nalgebra, and the edge-timed filter for any law), `vsqrt` (on Arm with a unit for floats, the
+//! no board has: the observer, on nalgebra, the edge-timed filter for any law, and counts over time), `vsqrt` (on Arm with a unit for floats, the
 //! square root by its one instruction, the only `unsafe` of the crate), `defmt`.
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
@@ -42,6 +42,8 @@ mod arithmetic;
 mod bounds;
 pub mod certificate;
 mod codes;
+#[cfg(feature = "linalg")]
+mod counts_over_time;
 mod derivative;
 pub mod edge_timed;
 mod error;
@@ -73,6 +75,8 @@ pub use bounds::{Bounds, Tolerances};
 pub use codes::{
     Counts, Dac, DacCode, DacParams, Encoder, EncoderParams, FixedCounts, Micros, SamplingParams,
 };
+#[cfg(feature = "linalg")]
+pub use counts_over_time::{CountsOverTime, CountsOverTimeParams, CountsOverTimeState};
 pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
 pub use error::ParamError;
 pub use feasibility::{Envelope, Infeasible, Obstacle, check_path};

@@ -1,5 +1,8 @@
-//! Source of a law's error rate: the paper's difference (5), an edge-timed filter, or an observer.
+//! Source of a law's error rate: the paper's difference (5), counts over time, an edge-timed filter, or an observer.
+//! Boards have the first.
 
+#[cfg(feature = "linalg")]
+use crate::counts_over_time::{CountsOverTime, CountsOverTimeParams, CountsOverTimeState};
 use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
 #[cfg(feature = "linalg")]
 use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
@@ -12,6 +15,9 @@ crate::choice! {
     pub enum VelocityParams<T>: Default {
         /// The smoothed backward difference of the error (5).
         SmoothedDerivative(SmoothedDerivativeParams<T>) = "smoothed_derivative",
+        /// Counts over the time between edges of the encoder (M/T).
+        #[cfg(feature = "linalg")]
+        CountsOverTime(CountsOverTimeParams<T>) = "counts_over_time",
         /// A Kalman filter that is corrected where an edge of the encoder is crossed.
         #[cfg(feature = "linalg")]
         EdgeTimed(EdgeTimedParams<T>) = "edge_timed",
@@ -27,6 +33,9 @@ crate::choice! {
 pub enum VelocitySource<T> {
     /// The smoothed backward difference of the error (5).
     SmoothedDerivative(SmoothedDerivative<T>),
+    /// Counts over time.
+    #[cfg(feature = "linalg")]
+    CountsOverTime(CountsOverTime<T>),
     /// The edge-timed filter.
     #[cfg(feature = "linalg")]
     EdgeTimed(EdgeTimed<T>),
@@ -39,6 +48,8 @@ pub enum VelocitySource<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityState<T> {
     derivative: DerivativeState<T>,
+    #[cfg(feature = "linalg")]
+    counts_over_time: CountsOverTimeState<T>,
     #[cfg(feature = "linalg")]
     edge_timed: EdgeTimedState<T>,
     #[cfg(feature = "linalg")]
@@ -62,6 +73,10 @@ impl<T: Real> VelocitySource<T> {
                 VelocitySource::SmoothedDerivative(SmoothedDerivative::new(p, encoder, period)?)
             }
             #[cfg(feature = "linalg")]
+            VelocityParams::CountsOverTime(p) => {
+                VelocitySource::CountsOverTime(CountsOverTime::new(p, encoder, period)?)
+            }
+            #[cfg(feature = "linalg")]
             VelocityParams::EdgeTimed(p) => {
                 VelocitySource::EdgeTimed(EdgeTimed::new(p, plant, encoder, period)?)
             }
@@ -79,6 +94,11 @@ impl<T: Real> VelocitySource<T> {
         let _ = applied;
         VelocityState {
             derivative: DerivativeState::at(FixedCounts(target.position.0.wrapping_sub(position.0))),
+            #[cfg(feature = "linalg")]
+            counts_over_time: match self {
+                VelocitySource::CountsOverTime(m) => m.start(position, target.velocity),
+                _ => CountsOverTimeState::default(),
+            },
             #[cfg(feature = "linalg")]
             edge_timed: match self {
                 VelocitySource::EdgeTimed(f) => f.start(position, applied, target.velocity),
@@ -106,6 +126,10 @@ impl<T: Real> VelocitySource<T> {
         match self {
             VelocitySource::SmoothedDerivative(d) => {
                 d.update(&mut state.derivative, FixedCounts(target.position.0.wrapping_sub(position.0)))
+            }
+            #[cfg(feature = "linalg")]
+            VelocitySource::CountsOverTime(m) => {
+                target.velocity - m.update(&mut state.counts_over_time, position)
             }
             #[cfg(feature = "linalg")]
             VelocitySource::EdgeTimed(f) => {

@@ -13,9 +13,9 @@ use clutch_core::law::{GlideParams, LawParams, ShellParams, Terms};
 use clutch_core::params::Choice;
 use clutch_core::supervisor::{BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{
-    Bounds, Counts, DacCode, FNV_64, FixedCounts, FrictionMap, Micros, ObserverParams, OnDisc, Real,
-    SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
-    SupervisorState, Target, Tolerances, VelocityParams, fnv1a_64,
+    Bounds, Counts, CountsOverTimeParams, DacCode, FNV_64, FixedCounts, FrictionMap, Micros, ObserverParams,
+    OnDisc, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo, ServoParams, Supervisor,
+    SupervisorParams, SupervisorState, Target, Tolerances, VelocityParams, fnv1a_64,
 };
 use shaft::{Actuator, COUNTS_PER_RADIAN, PERIOD, Shaft, path, wave};
 use std::collections::VecDeque;
@@ -182,6 +182,7 @@ fn decided<T: Real, X: Terms<T>>(hash: u64, cycle: &Cycle<T, X>) -> u64 {
 /// Each law of the list around either actuator, with each source of velocity, and in a shell.
 fn laws() -> Vec<Run> {
     let others = [
+        VelocityParams::CountsOverTime(CountsOverTimeParams::default()),
         VelocityParams::EdgeTimed(EdgeTimedParams::default()),
         VelocityParams::Observer(ObserverParams::default()),
     ];

@@ -22,7 +22,7 @@ pub use path::{Path, Prepared};
 pub use points::MAX_KNOTS;
 pub use refused::Refusing;
 
-use clutch_core::params::{Params, Table as _};
+use clutch_core::params::{Choice, Params, Table as _};
 use clutch_core::reference::{Knot, ReferenceParams, Table};
 use clutch_core::{
     Bounds, Encoder, EncoderParams, FixedCounts, ParamError, SamplingParams, Servo, ServoParams, Supervisor,
@@ -35,8 +35,8 @@ use walk::{Place, Visit, Walk};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsupported {
-    /// The velocity comes from an observer; boards have the smoothed derivative (5).
-    Observer,
+    /// The velocity comes from this source; boards have the smoothed derivative (5).
+    Velocity(&'static str),
     /// A table of so many points; [`MAX_KNOTS`] is the most.
     Knots(usize),
 }
@@ -44,9 +44,12 @@ pub enum Unsupported {
 impl core::fmt::Display for Unsupported {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Unsupported::Observer => f.write_str(
-                "velocity.observer: a board that closes the loop has velocity.smoothed_derivative only",
-            ),
+            Unsupported::Velocity(source) => {
+                write!(
+                    f,
+                    "velocity.{source}: expected velocity.smoothed_derivative, the only source of a board that closes the loop"
+                )
+            }
             Unsupported::Knots(n) => {
                 write!(
                     f,
@@ -140,12 +143,12 @@ impl Settings {
     /// The settings of a run.
     ///
     /// # Errors
-    /// An observer, a table of more than [`MAX_KNOTS`] points.
+    /// Another source of the velocity than (5), a table of more than [`MAX_KNOTS`] points.
     pub fn new(run: &RunParams<'_>) -> Result<Settings, Unsupported> {
         let (servo, supervisor) = (run.servo, run.supervisor);
-        #[allow(irrefutable_let_patterns, reason = "boards compile without the observer")]
+        #[allow(irrefutable_let_patterns, reason = "boards compile without the others")]
         let VelocityParams::SmoothedDerivative(velocity) = servo.velocity else {
-            return Err(Unsupported::Observer);
+            return Err(Unsupported::Velocity(Choice::<f32>::name(&servo.velocity)));
         };
         let knots =
             if let ReferenceParams::Table(Table { knots, .. }) = run.reference { knots } else { &[][..] };

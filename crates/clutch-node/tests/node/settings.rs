@@ -1,17 +1,18 @@
 //! A run as numbers: what the host planned is what the board builds, or it is refused.
 
 use crate::desk::{PATHS, Plan, key};
+use clutch_core::edge_timed::EdgeTimedParams;
 use clutch_core::law::{
     CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
     SmcSignParams, SuperTwistingParams,
 };
 use clutch_core::params::{Choice, Params};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
-use clutch_core::{FNV_64, LimitParams, fnv1a_64};
 use clutch_core::{
-    FixedCounts, Micros, ObserverParams, SafeState, Servo, ServoParams, SmoothedDerivativeParams,
-    SupervisorParams, VelocityParams,
+    CountsOverTimeParams, FixedCounts, Micros, ObserverParams, SafeState, Servo, ServoParams,
+    SmoothedDerivativeParams, SupervisorParams, VelocityParams,
 };
+use clutch_core::{FNV_64, LimitParams, fnv1a_64};
 use clutch_settings::{
     Built, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings, Unsupported,
 };
@@ -334,8 +335,15 @@ fn a_table_without_points_is_refused() {
 }
 
 #[test]
-fn an_observer_is_not_for_boards() {
-    let velocity = VelocityParams::Observer(ObserverParams::default());
-    let plan = Plan { servo: ServoParams { velocity, ..Plan::new().servo }, ..Plan::new() };
-    assert_eq!(Settings::new(&plan.run_params()).unwrap_err(), Unsupported::Observer);
+fn another_velocity_than_5_is_not_for_boards_and_its_key_is_named() {
+    for velocity in [
+        VelocityParams::CountsOverTime(CountsOverTimeParams::default()),
+        VelocityParams::EdgeTimed(EdgeTimedParams::default()),
+        VelocityParams::Observer(ObserverParams::default()),
+    ] {
+        let plan = Plan { servo: ServoParams { velocity, ..Plan::new().servo }, ..Plan::new() };
+        let refused = Settings::new(&plan.run_params()).unwrap_err();
+        let key = format!("velocity.{}: expected velocity.smoothed_derivative", velocity.name());
+        assert!(refused.to_string().starts_with(&key), "{refused}");
+    }
 }

@@ -33,6 +33,11 @@ pub(super) const LAWS: &[Law] = &[
         scenario: "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.edge_timed]\ndelay_ticks = 1",
     },
     Law {
+        title: "the same, M/T",
+        short: "PI, M/T",
+        scenario: "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.counts_over_time]",
+    },
+    Law {
         title: "PD 1660/12.9, (5)",
         short: "PD, (5)",
         scenario: "[law.pd]\nkp_v_rad = 1660.0\nkd_v_s_rad = 12.9\n\n[velocity.smoothed_derivative]\nsmoothing = 0.712",
@@ -79,6 +84,7 @@ pub(super) const LAWS: &[Law] = &[
         short: "SMC, edges",
         scenario: "[law.smc]\n\n[velocity.edge_timed]\ndelay_ticks = 1",
     },
+    Law { title: "the same, M/T", short: "SMC, M/T", scenario: "[law.smc]\n\n[velocity.counts_over_time]" },
     Law { title: "CTC of Table 2, (5)", short: "Table 2: CTC, (5)", scenario: "[law.ctc]" },
     Law { title: "PD of Table 2, (5)", short: "Table 2: PD, (5)", scenario: "[law.pd]" },
 ];

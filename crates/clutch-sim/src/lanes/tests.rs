@@ -385,13 +385,14 @@ fn servos_that_are_computed_one_by_one_beside_motion_in_lanes_have_the_bits_of_r
     let map = format!("{{ rig = \"another\", points_deg_factor = [{}] }}", points.join(", "));
     let map = [("friction_map", map.as_str())];
     let late = [("rig.delay_ticks", "2"), ("output.bumpless_time_s", "0.1"), ("run.start", "rest")];
-    let cases: [(&str, Drawn<'_>, &[Values<'_>]); 12] = [
+    let cases: [(&str, Drawn<'_>, &[Values<'_>]); 13] = [
         ("pd_2", &drag, &[&map]), // which the law does not ask
         ("bench_glide_2", &[("reference.ramp.rate_deg_s", 0.1, 5.0)], &[]),
         ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&late]),
         ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&map]),
         ("pd_2", &drag, &[&[("law", "{ glide = {} }")]]),
         ("pd_2", &drag, &[&[("law", "{ glide = {} }"), sine, bench]]),
+        ("pd_2", &drag, &[&[("velocity.counts_over_time", "{}"), bench]]),
         ("pd_2", &drag, &[&[("velocity.edge_timed", "{}"), bench]]),
         ("pd_2", &drag, &[&[("velocity.edge_timed", "{}")], &fine]),
         ("smc_2", &[("law.smc.kp_v", 2.3, 6.0)], &[&[("velocity.observer", "{}")], &late]),
