@@ -61,7 +61,7 @@ const MAP: &str = "friction_map";
 /// Reads that table from a file that `clutch identify --map` has written.
 fn read_map(file: &Path) -> anyhow::Result<Value> {
     let name = file.display().to_string();
-    let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+    let text = clutch_sim::scenario::read_text(file).with_context(|| format!("{name}: cannot be read"))?;
     let mut table: Table = text.parse().with_context(|| format!("{name}: is no TOML"))?;
     match table.remove(MAP) {
         Some(map @ Value::Table(_)) => Ok(map),
@@ -72,6 +72,6 @@ fn read_map(file: &Path) -> anyhow::Result<Value> {
 /// A file that `clutch identify --out` has written.
 pub(crate) fn read_rig_file(file: &Path) -> anyhow::Result<RigFile> {
     let name = file.display().to_string();
-    let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+    let text = clutch_sim::scenario::read_text(file).with_context(|| format!("{name}: cannot be read"))?;
     Ok(RigFile::parse(&name, &text)?)
 }

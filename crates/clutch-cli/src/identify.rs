@@ -10,9 +10,11 @@ use clap::Args;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::{Added, Separate};
 use clutch_identify::experiment::{ExperimentError, PartRunner};
+use clutch_identify::recording::MOST_TABLE_MIB;
 use clutch_identify::{Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
+use clutch_sim::scenario::read_text_up_to;
 use serde_json::{Value, json as value};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -263,7 +265,8 @@ impl Identify {
             let [counts, volts] = &self.columns[..] else {
                 bail!("--columns {}: expected two names, as counts,volts", self.columns.join(","));
             };
-            let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+            let text =
+                read_text_up_to(file, MOST_TABLE_MIB).with_context(|| format!("{name}: cannot be read"))?;
             let spec = scenario.spec();
             let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
             let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);

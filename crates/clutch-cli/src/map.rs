@@ -26,7 +26,7 @@ use serde_json::json as value;
 pub(crate) struct Map {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// The key across and its values: LOW:HIGH:NUMBER, evenly spaced in ratio, or a list; unless given, the law's first
+    /// The key across and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a list; unless given, the law's first
     /// gain from a quarter to four times its value.
     #[arg(long, value_name = "KEY=VALUES", value_parser = axis)]
     x: Option<Axis>,
@@ -62,10 +62,13 @@ pub(crate) fn values(text: &str) -> Result<List, String> {
         [low, high, n] => {
             let (low, high) = (read(low)?, read(high)?);
             let n: usize = n.trim().parse().map_err(|_| wrong(expected))?;
-            if !(low > 0.0 && high > low && high.is_finite() && (2..=MOST).contains(&n)) {
-                return Err(wrong(&format!("expected 0 < LOW < HIGH and 2 to {MOST} values")));
+            if !(low.is_finite() && high > low && high.is_finite() && (2..=MOST).contains(&n)) {
+                return Err(wrong(&format!("expected LOW < HIGH and 2 to {MOST} values")));
             }
-            let step = |i: usize| low * (high / low).powf(i as f64 / (n - 1) as f64);
+            let share = |i: usize| i as f64 / (n - 1) as f64;
+            let step = |i: usize| {
+                if low > 0.0 { low * (high / low).powf(share(i)) } else { low + (high - low) * share(i) }
+            };
             // Four digits: what is typed again is what was run.
             (0..n).map(|i| format!("{:.3e}", step(i)).parse().unwrap_or(f64::NAN)).collect()
         }

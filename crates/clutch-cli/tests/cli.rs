@@ -852,7 +852,7 @@ fn a_map_that_cannot_be_is_refused_by_key_value_and_expectation() {
     for (args, code, said) in [
         (&["--x", "kp"][..], 64, "expected KEY=VALUES"),
         (&["--x", "law.pd.kp_v_rad=1:2"], 64, "1:2: expected LOW:HIGH:NUMBER"),
-        (&["--x", "law.pd.kp_v_rad=2:1:3"], 64, "2:1:3: expected 0 < LOW < HIGH and 2 to 1000 values"),
+        (&["--x", "law.pd.kp_v_rad=2:1:3"], 64, "2:1:3: expected LOW < HIGH and 2 to 1000 values"),
         (&["--x", "law.pd.kp_v_rad=a,b"], 64, "a,b: expected LOW:HIGH:NUMBER"),
         (&["--y", "law.pd.kp_v_rad=1,2"], 64, "--x"),
         (&["--discs", "-1"], 64, "-1"),
@@ -1089,6 +1089,48 @@ fn a_sweep_that_was_cut_off_goes_on_and_ends_with_the_same_file() {
     assert!(err(&other).contains("its row 5 is not what this sweep gives"), "{}", err(&other));
     let again = sweep(whole_name, &[]);
     assert!(err(&again).contains("is there already; --resume goes on with it"), "{}", err(&again));
+}
+
+#[test]
+fn rows_of_two_sweeps_are_not_mixed_and_those_that_were_refused_stay_counted() {
+    let dir = folder("sweep_mixed");
+    let file = dir.join("rows.csv");
+    let name = file.to_str().expect("UTF-8");
+    let run = |over: &str, more: &[&str]| {
+        let args = ["sweep", "pd_2", "--set", "run.duration_s=1.2", "--over", over, "--out", name];
+        clutch(&[&args[..], more].concat())
+    };
+    assert!(run("law.pd.kp_v_rad=1000,-1,2000", &[]).status.success());
+    // The last row is the same in both.
+    let o = run("law.pd.kp_v_rad=9000,-1,2000,3000", &["--resume"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("its row 1 has other values than this sweep gives it, 9000;"), "{}", err(&o));
+    let o = run("law.pd.kp_v_rad=1000,-1,2000,3000", &["--resume"]);
+    assert!(
+        out(&o).contains("4 of 4 rows") && out(&o).contains("3 of them from before; 1 refused"),
+        "{}",
+        out(&o)
+    );
+}
+
+#[test]
+fn a_grid_of_which_one_half_is_refused_runs_the_other() {
+    let dir = folder("sweep_half");
+    let file = dir.join("half.csv");
+    let gains = ["--over", "law.pd.kd_v_s_rad=-1,5", "--over", "law.pd.kp_v_rad=1:100:200"];
+    let o = clutch(
+        &[
+            &["sweep", "pd_2", "--set", "run.duration_s=1.01"][..],
+            &gains,
+            &["--out", file.to_str().expect("UTF-8")],
+        ]
+        .concat(),
+    );
+    assert!(out(&o).contains("400 of 400 rows") && out(&o).contains("200 refused"), "{}{}", out(&o), err(&o));
+    let many = file.with_extension("many.csv");
+    let many = ["--seeds", "1000000001", "--out", many.to_str().expect("UTF-8")];
+    let o = clutch(&[&["sweep", "pd_2", "--over", "law.pd.kp_v_rad=1,2"][..], &many].concat());
+    assert!(err(&o).contains("the grid has more than 1000000000 rows"), "{}", err(&o));
 }
 
 #[test]

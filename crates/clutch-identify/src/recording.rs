@@ -69,6 +69,9 @@ pub enum ReadError {
     },
 }
 
+/// Most of a table that is read whole, MiB: some hours of a kilohertz.
+pub const MOST_TABLE_MIB: u64 = 256;
+
 impl Recording {
     /// Samples in a time, s.
     pub(crate) fn samples(&self, time: f64) -> usize {
@@ -227,7 +230,7 @@ impl Recording {
         let mut steps: Vec<f64> = ticks.windows(2).map(|w| (w[1].volts - w[0].volts).abs()).collect();
         steps.retain(|step| *step > 1e-9);
         let step_volts = steps.into_iter().fold(f64::INFINITY, f64::min);
-        Ok(Recording {
+        let mut found = Recording {
             name: name.to_owned(),
             motor,
             period,
@@ -236,7 +239,21 @@ impl Recording {
             volts_before: ticks[0].volts,
             first_tick: 0,
             ticks,
-        })
+        };
+        found.unwrap_counts();
+        let most = i64::from(counts_per_rev / 2);
+        let leap = found.ticks.windows(2).position(|w| (w[1].counts - w[0].counts).abs() > most);
+        match leap {
+            Some(i) => {
+                let by = found.ticks[i + 1].counts - found.ticks[i].counts;
+                let what = format!(
+                    "line {}: counts go on by {by} in one period: expected at most half a turn, {most}",
+                    i + 3
+                );
+                Err(table(name, &what))
+            }
+            None => Ok(found),
+        }
     }
 
     /// The same with the axis turned round.

@@ -7,10 +7,11 @@ use crate::stepping::native;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::Added;
 use clutch_identify::experiment::{ExperimentError, PartRunner};
-use clutch_identify::recording::ReadError;
+use clutch_identify::recording::{MOST_TABLE_MIB, ReadError};
 use clutch_identify::shown::{MOTOR_ROWS, ROWS};
 use clutch_identify::{Consent, Experiment, Identified, Recording, RigFile, believed};
 use clutch_sim::Scenario;
+use clutch_sim::scenario::read_text_up_to;
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -44,8 +45,8 @@ fn read(
     for path in logs {
         let name = path.display().to_string();
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-            let text =
-                std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
+            let text = read_text_up_to(path, MOST_TABLE_MIB)
+                .map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
             let spec = scenario.spec();
             let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
             let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);

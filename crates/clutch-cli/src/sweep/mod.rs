@@ -21,11 +21,12 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Runs a scenario with many values of its keys, and writes the figures of each run as a row of a table.
 ///
 /// Each --over is a key with its values; together they are a grid, of which the last key runs fastest. Rows are written in
-/// their order, some thousand at a time: what stops early goes on with --resume.
+/// their order, every second or so: what stops early goes on with --resume.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  clutch sweep pd_2 --over law.pd.kp_v_rad=500:5000:50 \\\n      --over law.pd.kd_v_s_rad=5,10,20,50 \
@@ -36,7 +37,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct SweepVerb {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// A key and its values: LOW:HIGH:NUMBER, evenly spaced in ratio, or a list. May be given several times.
+    /// A key and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a list. May be
+    /// given several times.
     #[arg(long, value_name = "KEY=VALUES", value_parser = over, required = true)]
     over: Vec<Over>,
     /// Runs each row with the seeds 1 to N.
@@ -54,8 +56,12 @@ pub(crate) struct SweepVerb {
     threads: Option<NonZeroUsize>,
 }
 
-/// Rows between two times that the file is written.
-const CHUNK: u64 = 4096;
+/// Rows between two times that the file is written: at first, and at most.
+const CHUNK: (u64, u64) = (64, 65_536);
+/// Time between two of them, s.
+const PAUSE_S: f64 = 1.0;
+/// Rows of the whole grid that are tried where the first are all refused.
+const TRIED: u64 = 256;
 /// More rows than anybody waits for.
 const MOST: u64 = 1_000_000_000;
 /// The key of `--seeds`.
@@ -65,22 +71,64 @@ const SEED: &str = "run.seed";
 #[derive(Clone, Debug)]
 struct Over {
     key: String,
-    values: Vec<Value>,
+    values: Values,
+}
+
+#[derive(Clone, Debug)]
+enum Values {
+    Listed(Vec<Value>),
+    /// 1 to n.
+    Seeds(u64),
+}
+
+impl Values {
+    fn len(&self) -> u64 {
+        match self {
+            Values::Listed(list) => list.len() as u64,
+            Values::Seeds(n) => *n,
+        }
+    }
+
+    fn at(&self, i: u64) -> Value {
+        match self {
+            Values::Listed(list) => list[i as usize].clone(),
+            Values::Seeds(_) => Value::Integer(i as i64 + 1),
+        }
+    }
 }
 
 fn over(text: &str) -> Result<Over, String> {
     let (key, list) = text.split_once('=').ok_or("expected KEY=VALUES, as law.pd.kp_v_rad=500:5000:50")?;
-    let values = if list.contains(':') {
+    let values = if list.contains(':') && !list.contains(['{', '[', '"']) {
         map::values(list)?.0.into_iter().map(Value::Float).collect()
     } else {
-        list.split(',').map(|item| value(item.trim())).collect::<Result<_, _>>()?
+        items(list).into_iter().map(|item| value(item.trim())).collect::<Result<_, _>>()?
     };
-    Ok(Over { key: key.trim().to_owned(), values })
+    Ok(Over { key: key.trim().to_owned(), values: Values::Listed(values) })
+}
+
+/// The parts of a list between commas that stand in no table, array or text.
+fn items(list: &str) -> Vec<&str> {
+    let (mut depth, mut quoted, mut from, mut parts) = (0_i32, false, 0, Vec::new());
+    for (i, c) in list.char_indices() {
+        match c {
+            '"' => quoted = !quoted,
+            '{' | '[' if !quoted => depth += 1,
+            '}' | ']' if !quoted => depth -= 1,
+            ',' if !quoted && depth == 0 => {
+                parts.push(&list[from..i]);
+                from = i + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(&list[from..]);
+    parts
 }
 
 fn value(text: &str) -> Result<Value, String> {
     let value = written_value(text).filter(|_| !text.is_empty());
-    value.ok_or_else(|| format!("`{text}`: expected numbers or words with a comma between them"))
+    value.ok_or_else(|| format!("`{text}`: expected numbers, words or tables with a comma between them"))
 }
 
 /// The rows of a sweep by their number.
@@ -99,14 +147,13 @@ impl Grid {
         seeds: Option<u64>,
     ) -> anyhow::Result<Self> {
         if let Some(n) = seeds {
-            let values = (1..=n.min(MOST)).map(|seed| Value::Integer(seed as i64)).collect();
-            axes.push(Over { key: SEED.to_owned(), values });
+            axes.push(Over { key: SEED.to_owned(), values: Values::Seeds(n) });
         }
         for (i, axis) in axes.iter().enumerate() {
             let twice = axes[..i].iter().any(|other| other.key == axis.key);
             ensure!(!twice, "{}: named twice; name a key once, with all of its values", axis.key);
         }
-        let rows = axes.iter().try_fold(1_u64, |n, axis| n.checked_mul(axis.values.len() as u64));
+        let rows = axes.iter().try_fold(1_u64, |n, axis| n.checked_mul(axis.values.len()));
         match rows {
             Some(rows) if rows <= MOST => Ok(Grid { origin, base: scenario.table().clone(), axes, rows }),
             _ => bail!("--over: the grid has more than {MOST} rows; give fewer values"),
@@ -121,8 +168,8 @@ impl Grid {
             .iter()
             .rev()
             .map(|axis| {
-                let n = axis.values.len() as u64;
-                let value = axis.values[(left % n) as usize].clone();
+                let n = axis.values.len();
+                let value = axis.values.at(left % n);
                 left /= n;
                 value
             })
@@ -139,10 +186,31 @@ impl Grid {
             .collect()
     }
 
+    /// The values of a row as the file has them.
+    fn keys_of(&self, row: u64) -> Vec<String> {
+        let plain = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        self.values(row).into_iter().map(plain).collect()
+    }
+
+    /// Some rows, in their order.
+    fn sweep(&self, rows: impl Iterator<Item = u64>) -> anyhow::Result<Sweep> {
+        let keys = self.axes.iter().map(|axis| axis.key.clone()).collect();
+        let values = rows.map(|row| self.values(row)).collect();
+        Ok(Sweep::new(&self.origin, self.base.clone(), keys, values)?)
+    }
+
+    /// True if one of some rows all over the grid is a scenario.
+    fn any_runs(&self) -> anyhow::Result<bool> {
+        let tried = self.rows.min(TRIED);
+        // By a step that shares few factors with the axes: a row of each of their values is among them.
+        let step = (self.rows / tried) | 1;
+        let sweep = self.sweep((0..tried).map(|i| i * step % self.rows))?;
+        Ok((0..sweep.len()).any(|row| sweep.scenario(row).is_ok_and(|scenario| scenario.plan().is_ok())))
+    }
+
     /// A row of the file.
     fn record(&self, row: u64, outcome: &Result<Row, ScenarioError>) -> Vec<String> {
-        let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        let mut record: Vec<String> = self.values(row).iter().map(plain).collect();
+        let mut record = self.keys_of(row);
         let (metrics, detected) = match outcome {
             Ok(row) => (row.run.metrics, row.run.detected),
             Err(_) => Default::default(),
@@ -158,17 +226,15 @@ impl Grid {
         record
     }
 
-    /// Runs some rows; none of them if it was stopped.
+    /// Runs some rows; of a sweep that is stopped the first that have ended.
     fn run(
         &self,
         rows: std::ops::Range<u64>,
         threads: usize,
         stop: &AtomicBool,
         progress: Report<'_>,
-    ) -> anyhow::Result<Option<Vec<Result<Row, ScenarioError>>>> {
-        let keys = self.axes.iter().map(|axis| axis.key.clone()).collect();
-        let values: Vec<Vec<Value>> = rows.map(|row| self.values(row)).collect();
-        let sweep = Sweep::new(&self.origin, self.base.clone(), keys, values)?;
+    ) -> anyhow::Result<Vec<Result<Row, ScenarioError>>> {
+        let sweep = self.sweep(rows)?;
         let found: Mutex<Vec<Option<Result<Row, ScenarioError>>>> =
             Mutex::new(std::iter::repeat_with(|| None).take(sweep.len()).collect());
         sweep.run(threads, Keep::Figures, stop, &|i, row| {
@@ -179,8 +245,7 @@ impl Grid {
                 stop.store(true, Ordering::Relaxed);
             }
         });
-        let found = found.into_inner().unwrap_or_default();
-        Ok(if stop.load(Ordering::Relaxed) { None } else { found.into_iter().collect() })
+        Ok(found.into_inner().unwrap_or_default().into_iter().map_while(|row| row).collect())
     }
 }
 
@@ -196,10 +261,16 @@ fn line(record: &[String]) -> anyhow::Result<Vec<u8>> {
     Ok(out.into_inner()?)
 }
 
-/// A file that rows are added to, and how many it has.
+/// A file that rows are added to, how many it has, and how many of them are refused.
 struct Begun {
     file: File,
     rows: u64,
+    refused: u64,
+}
+
+/// True if a line of the file is of a row that was refused: its last column has the reason.
+fn is_refused(line: &[u8]) -> bool {
+    !line.ends_with(b",\n")
 }
 
 impl SweepVerb {
@@ -211,33 +282,45 @@ impl SweepVerb {
         let (out, resume) = (lines_of(&self.out)?, self.resume);
         let grid = Grid::new(origin, &scenario, self.over, self.seeds)?;
         let stop = stop_flag()?;
-        let Begun { mut file, rows: before } =
+        let Begun { mut file, rows: before, mut refused } =
             if resume && out.exists() { go_on(&grid, &out, threads, &stop)? } else { begin(&grid, &out)? };
         let wrong = || format!("{}: cannot be written", out.display());
-        let (mut rows, mut refused) = (before, 0);
+        // Each thread has a vector's rows.
+        let least = (8 * threads as u64).min(CHUNK.1);
+        let (mut rows, mut chunk) = (before, CHUNK.0.max(least));
         let done = with_progress("rows", |progress| -> anyhow::Result<bool> {
             if before > 0 {
                 let _ = progress(Progress { total: grid.rows, finished: before });
             }
             while rows < grid.rows {
-                let chunk = rows..(rows + CHUNK).min(grid.rows);
-                let Some(found) = grid.run(chunk.clone(), threads, &stop, progress)? else {
-                    return Ok(false);
-                };
+                let next = rows..(rows + chunk).min(grid.rows);
+                let begun = Instant::now();
+                let found = grid.run(next.clone(), threads, &stop, progress)?;
                 if rows == 0
                     && let Some(Err(first)) = found.first()
                     && found.iter().all(Result::is_err)
+                    && !grid.any_runs()?
                 {
                     drop(std::fs::remove_file(&out));
-                    bail!("none of the first {} rows is a scenario that runs: {first}", found.len());
+                    let of = if found.len() as u64 == grid.rows {
+                        ""
+                    } else {
+                        ", nor of others all over the grid,"
+                    };
+                    bail!("none of the first {} rows{of} is a scenario that runs: {first}", found.len());
                 }
                 let mut text = Vec::new();
-                for (row, outcome) in chunk.clone().zip(&found) {
+                for (row, outcome) in next.clone().zip(&found) {
                     refused += u64::from(outcome.is_err());
                     text.extend(line(&grid.record(row, outcome))?);
                 }
                 file.write_all(&text).and_then(|()| file.flush()).with_context(wrong)?;
-                rows = chunk.end;
+                rows += found.len() as u64;
+                if rows < next.end {
+                    return Ok(false);
+                }
+                let growth = (PAUSE_S / begun.elapsed().as_secs_f64().max(1e-3)).clamp(0.25, 4.0);
+                chunk = ((chunk as f64 * growth) as u64).clamp(least, CHUNK.1);
             }
             Ok(true)
         })?;
@@ -284,15 +367,15 @@ fn begin(grid: &Grid, out: &Path) -> anyhow::Result<Begun> {
     }
     let mut file = OpenOptions::new().write(true).create_new(true).open(out).with_context(wrong)?;
     file.write_all(&line(&grid.header())?).with_context(wrong)?;
-    Ok(Begun { file, rows: 0 })
+    Ok(Begun { file, rows: 0, refused: 0 })
 }
 
-/// A file of the same sweep: its last whole row, run again, has to come out the same.
+/// A file of the same sweep: each row has the values that this one gives it, and its last whole row, run again, comes out the same.
 fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::Result<Begun> {
     let name = out.display();
     let wrong = || format!("{}: cannot be read", out.display());
     let mut reader = BufReader::new(File::open(out).with_context(wrong)?);
-    let (mut last, mut length, mut lines) = (Vec::new(), 0, 0_u64);
+    let (mut last, mut length, mut lines, mut refused) = (Vec::new(), 0, 0_u64, 0);
     loop {
         let mut next = Vec::new();
         reader.read_until(b'\n', &mut next).with_context(wrong)?;
@@ -301,6 +384,17 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
         }
         if lines == 0 && next != line(&grid.header())? {
             bail!("{name}: has other columns than this sweep; name another file");
+        }
+        if lines > 0 && lines <= grid.rows {
+            let mut begins = line(&grid.keys_of(lines - 1))?;
+            begins.pop();
+            begins.push(b',');
+            ensure!(
+                next.starts_with(&begins),
+                "{name}: its row {lines} has other values than this sweep gives it, {}; name another file",
+                grid.keys_of(lines - 1).join(", ")
+            );
+            refused += u64::from(is_refused(&next));
         }
         length += next.len() as u64;
         lines += 1;
@@ -311,7 +405,7 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     ensure!(rows <= grid.rows, "{name}: has {rows} rows, and this sweep {}; name another file", grid.rows);
     if rows > 0 {
         let again = grid.run(rows - 1..rows, threads, stop, clutch_sim::progress::UNWATCHED)?;
-        let again = again.as_deref().and_then(<[_]>::first).map(|row| line(&grid.record(rows - 1, row)));
+        let again = again.first().map(|row| line(&grid.record(rows - 1, row)));
         let same = again.transpose()?.is_some_and(|again| again == last);
         ensure!(
             same,
@@ -322,19 +416,27 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     let wrong = || format!("{}: cannot be written", out.display());
     let file = OpenOptions::new().append(true).open(out).with_context(wrong)?;
     file.set_len(length).with_context(wrong)?;
-    Ok(Begun { file, rows })
+    Ok(Begun { file, rows, refused })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn list(text: &str) -> Vec<Value> {
+        let values = over(text).unwrap().values;
+        (0..values.len()).map(|i| values.at(i)).collect()
+    }
+
     #[test]
-    fn values_are_ranges_or_lists_of_numbers_and_words() {
-        let list = |text: &str| over(text).unwrap().values;
+    fn values_are_ranges_or_lists_of_numbers_words_and_tables() {
         assert_eq!(list("a.b=1,2.5, x"), [Value::Integer(1), Value::Float(2.5), Value::String("x".into())]);
         assert_eq!(list("a=1:100:3"), [1.0, 10.0, 100.0].map(Value::Float));
-        for wrong in ["a", "a=", "a=1,,2", "a=1:2", "a=0:1:3", "a=x y"] {
+        assert_eq!(list("a=-5:5:3"), [-5.0, 0.0, 5.0].map(Value::Float));
+        let laws = list("law={ pd = { kp_v_rad = 1.0, kd_v_s_rad = 2.0 } },{ smc = {} }");
+        assert_eq!(laws.len(), 2, "{laws:?}");
+        assert_eq!(list("a=\"x,y\",z").len(), 2);
+        for wrong in ["a", "a=", "a=1,,2", "a=1:2", "a=2:1:3", "a=0:inf:3", "a=x y"] {
             assert!(over(wrong).is_err(), "{wrong}");
         }
     }

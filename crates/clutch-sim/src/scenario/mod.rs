@@ -845,19 +845,25 @@ fn overlay(base: &mut Table, over: Table) {
     }
 }
 
-/// Most text of a file that is read whole, bytes.
-const MOST_TEXT: u64 = 16 << 20;
-
 /// The text of a file that people write, which is no longer than 16 MiB.
 ///
 /// # Errors
-/// It cannot be read, is longer, or is no text.
+/// As [`read_text_up_to`].
 pub fn read_text(path: &Path) -> std::io::Result<String> {
+    read_text_up_to(path, 16)
+}
+
+/// The text of a file of at most so many MiB.
+///
+/// # Errors
+/// It cannot be read, is longer, or is no text.
+pub fn read_text_up_to(path: &Path, most_mib: u64) -> std::io::Result<String> {
     use std::io::{ErrorKind, Read as _};
+    let most = most_mib << 20;
     let mut text = String::new();
-    let read = std::fs::File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)?;
-    if read as u64 > MOST_TEXT {
-        let message = format!("more than {} MiB: expected a file that somebody wrote", MOST_TEXT >> 20);
+    let read = std::fs::File::open(path)?.take(most + 1).read_to_string(&mut text)?;
+    if read as u64 > most {
+        let message = format!("more than {most_mib} MiB: expected a shorter file");
         return Err(std::io::Error::new(ErrorKind::FileTooLarge, message));
     }
     Ok(text)
