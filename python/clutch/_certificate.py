@@ -321,5 +321,5 @@ class Certificate(_Record):
     sampled: Sampled
 
     def __bool__(self) -> bool:
-        """True if the gains are certified."""
-        return self.certified
+        """True if the gains are certified in continuous time, and the sampled loop is not known to be unstable."""
+        return self.certified and (self.sampled.stable is not False or self.sampled.any_law)

@@ -31,11 +31,13 @@ class LoopResult:
         Where control ended, why, and why in words.
     value : float
         The value that the check saw that ended it.
-    certified : bool
+    certified_continuous_time : bool
         True if the gains are certified, in continuous time, for the scenario's bounds.
     sampled : dict
-        The verdict on the error of the sampled loop: ``error_bound_rad``, ``verdict`` in words, with its scope, and
-        ``certificate``, the file. Without one file and bound are None.
+        The verdicts on the sampled loop: on the error ``error_bound_rad``, ``verdict`` in words, with its scope, and
+        ``certificate``, the file (without one file and bound are None); on linear stability ``spectral_radius`` with
+        the weakest, a middle and the strongest actuator, and ``stable`` (None if not known); ``sticks_excluded``, which
+        neither does.
     ticks : int
         Periods in which the law was asked.
     drift : dict
@@ -91,7 +93,7 @@ class LoopResult:
     cause: str
     cause_text: str
     value: float
-    certified: bool
+    certified_continuous_time: bool
     sampled: dict[str, Any]
     drift: dict[str, Any]
     ended_by_drift: bool

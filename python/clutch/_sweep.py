@@ -362,8 +362,8 @@ def sweep(
         executor of processes runs several, and needs a law that can be pickled. An exception of the law ends the
         sweep, with ``errors="keep"``, too.
     metrics
-        Names of fields of `Metrics`, and "certified": true if the gains are certified for the row's bounds.
-        Default: all of them.
+        Names of fields of `Metrics`, and "certified_continuous_time": true if the gains are certified so for the row's
+        bounds. Default: all of them.
     seeds
         A number n for the seeds 1 … n, or seeds: each row is run with each. One run is one draw; compare
         over several seeds.
@@ -468,7 +468,7 @@ _OF_SAMPLES = {"detected_least_cycles_per_s", "detected_most_cycles_per_s", "det
 
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
     # Those that a run has of which only figures are kept.
-    known = [*(name for name in FIGURES if name not in _OF_SAMPLES), "certified"]
+    known = [*(name for name in FIGURES if name not in _OF_SAMPLES), "certified_continuous_time"]
     chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
     unknown = [m for m in chosen if m not in known]
     if unknown:
@@ -575,7 +575,7 @@ class _OwnLaw:
         columns: dict[str, Any] = {"row": np.arange(len(runs), dtype=np.int64)}
         for name in self._work.metrics:
             # A certificate is of the scenario's law, which did not run.
-            kind, none = (bool, False) if name == "certified" else (float, math.nan)
+            kind, none = (bool, False) if name == "certified_continuous_time" else (float, math.nan)
             values = [getattr(done.metrics, name, none) if isinstance(done, Result) else none for _, done in runs]
             columns[name] = np.asarray([none if value is None else value for value in values], dtype=kind)
         errors = [str(done) if isinstance(done, ParamError) else "" for _, done in runs]
@@ -630,7 +630,7 @@ class _Finished:
             columns[key] = _column([row[i] for row in self.samples.rows])[rows]
         for name in metrics:
             parts = [table[name] for _, table in tables]
-            nothing = np.empty(0, dtype=bool if name == "certified" else float)
+            nothing = np.empty(0, dtype=bool if name == "certified_continuous_time" else float)
             columns[name] = np.concatenate(parts)[order] if parts else nothing
         columns["error"] = np.asarray([texts[i] for i in order], dtype=object)
         return Table(columns)
@@ -919,8 +919,8 @@ class SweepResult:
         """
         if metric not in self.metrics:
             raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
-        if metric == "certified":
-            raise ValueError("certified cannot be minimised; filter by it and rank by another metric")
+        if metric == "certified_continuous_time":
+            raise ValueError("certified_continuous_time cannot be minimised; filter by it and rank by another metric")
         runs, texts = self.table["row"].tolist(), self.table["error"]
         columns = {name: self.table[name].tolist() for name in self.metrics}
         groups: dict[int, list[int]] = {}

@@ -91,7 +91,7 @@ def test_a_sweep_with_an_own_law_gives_each_run_a_fresh_copy():
         run = clutch.simulate("pd_2", law=OwnPd, overrides={"rig.base": base, "run.seed": seed})
         assert here.table["rms_error_rad"][i] == run.metrics.rms_error_rad
         assert here.traces[i]["error_rad"].tolist() == run.samples["error_rad"][::10].tolist()
-    assert not here.table["certified"].any()
+    assert not here.table["certified_continuous_time"].any()
     with ProcessPoolExecutor(2) as pool:
         there = clutch.sweep("pd_2", parameters, law=law, executor=pool, chunk=1)
     assert there.table["rms_error_rad"].tolist() == here.table["rms_error_rad"].tolist()

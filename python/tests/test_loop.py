@@ -39,13 +39,14 @@ def test_a_run_to_the_paths_end_is_done_and_its_log_replays(tmp_path):
     log = tmp_path / "run.mcap"
     result = package.loop("board_smc_2", duration=1.5, log=log)
     assert (result.verdict, result.state, result.cause, result.ticks) == ("done", "Holding", "Done", 1500)
-    assert result.cause_text == "the path is done" and result.board_safe and result.certified
+    assert result.cause_text == "the path is done" and result.board_safe
+    assert result.certified_continuous_time and result.sampled["stable"] and not result.sampled["sticks_excluded"]
     assert result.samples["lost"] == result.bad_frames == result.log_dropped == 0
     assert result.response["count"] == result.ticks and 0 < result.response["p50_us"] <= result.response["max_us"]
     assert result.scenario == package.Scenario.load("board_smc_2", {"run.duration_s": 1.5})
     assert result.log == log and package.replay(log).identical
     written = package.read_log(log)
-    assert written.complete and written.metadata["certified"] == "true"
+    assert written.complete and written.metadata["certified_continuous_time"] == "true"
     text = str(result).splitlines()
     assert text[0] == result.scenario.name and text[-1] == "the path is done; the board is in its safe state"
     assert "  gains       certified in continuous time for the bounds given" in result.announcement.splitlines()
@@ -123,7 +124,7 @@ def test_gains_that_are_not_certified_are_refused_as_by_the_command(clutch):
     assert " ".join(command.split()).startswith(" ".join(refusal.split()))
     assert "uncertified=True runs it all the same" in str(caught.value)
     result = package.loop("board_smc_2", overrides=weak, uncertified=True, duration=1.2)
-    assert not result.certified and "NOT certified" in result.announcement
+    assert not result.certified_continuous_time and "NOT certified" in result.announcement
 
 
 @pytest.mark.parametrize(

@@ -1074,7 +1074,8 @@ def test_a_certificate_says_what_the_command_prints(request):
         printed = json.loads(done.stdout)
         certificate = clutch.Scenario.load(name).certificate()
         assert json.loads(json.dumps(dataclasses.asdict(certificate))) == printed, name
-        assert bool(certificate) == certificate.certified == (done.returncode == 0)
+        assert bool(certificate) == (done.returncode == 0)
+        assert certificate.certified or not certificate
 
 
 def test_a_certificate_comes_back_from_repr_pickle_and_replace():

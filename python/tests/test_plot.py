@@ -443,7 +443,7 @@ def test_a_keys_label_has_the_unit_of_its_row(key, label):
         ("break_away_torque_nm", "torque at break-away (mN m)", 1000.0),
         ("control_variation_v_s", "voltage variation (V/s)", 1.0),
         ("detected_stick_slip_cycles_per_s", "stick-slip seen by the encoder (cycles/s)", 1.0),
-        ("certified", "certified", 1.0),
+        ("certified_continuous_time", "certified_continuous_time", 1.0),
         ("law.smc.kp_v", "law.smc.kp (V)", 1.0),
     ],
 )

@@ -52,7 +52,7 @@ def assert_rows_are_single_runs(base, result):
         figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["row"][i]], strict=True)))
         for name in FIGURES:
             np.testing.assert_array_equal(result.table[name][i], figures[name], err_msg=f"row {i}: {name}")
-        assert result.table["certified"][i] == bool(run.scenario.certificate())
+        assert result.table["certified_continuous_time"][i] == bool(run.scenario.certificate())
 
 
 # --- Rows to run -------------------------------------------------------------------------------
@@ -79,9 +79,9 @@ def test_a_grid_runs_every_combination_with_the_last_key_fastest(short):
     assert result.table["law.smc.kp_v"].tolist() == [3, 3, 3, 4, 4, 4]
     assert result.table["run.seed"].tolist() == [7, 5, 6, 7, 5, 6]
     assert result.table["row"].tolist() == [0, 1, 2, 3, 4, 5]
-    assert result.table.columns == ["row", "law.smc.kp_v", "run.seed", *FIGURES, "certified", "error"]
+    assert result.table.columns == ["row", "law.smc.kp_v", "run.seed", *FIGURES, "certified_continuous_time", "error"]
     assert result.table["error"] == [""] * 6
-    assert result.table["run.seed"].dtype == np.int64 and result.table["certified"].dtype == bool
+    assert result.table["run.seed"].dtype == np.int64 and result.table["certified_continuous_time"].dtype == bool
 
 
 def test_seeds_are_crossed_with_every_row(short):
@@ -217,7 +217,7 @@ def test_refused_rows_are_kept_on_request(short):
     for name in FIGURES:
         if name != "break_away_torque_nm":
             assert [math.isnan(x) for x in result.table[name]] == [False, True, False], name
-    assert not result.table["certified"][1]
+    assert not result.table["certified_continuous_time"][1]
     assert sorted(result.traces) == [0, 2]
     assert result.best("max_error_rad")[0]["law.smc.kp_v"] == 4.0
     with pytest.raises(ValueError, match="errors"):
@@ -250,7 +250,7 @@ def test_a_grid_becomes_a_dataset_with_named_dimensions(short):
     one = data["max_error_rad"].sel({"law.smc.kp_v": 4.0, "rig.base": "paper", "run.seed": 3})
     assert float(one) == result.table["max_error_rad"][8]
     assert data["max_error_rad"].attrs == {"long_name": "max |error|", "units": "rad"}
-    assert not data["certified"].attrs and not data["error"].attrs
+    assert not data["certified_continuous_time"].attrs and not data["error"].attrs
     points = clutch.sweep(short, clutch.sobol({"law.smc.kp_v": (2, 6)}, 4)).to_xarray()
     assert dict(points.sizes) == {"row": 4} and "law.smc.kp_v" in points.coords
 
@@ -265,7 +265,11 @@ def test_the_table_goes_to_data_frames_and_arrow(short):
     assert result.to_arrow()["rms_error_rad"].to_pylist() == expected
     assert pyarrow.table(result)["rms_error_rad"].to_pylist() == expected
     units = {field.name: (field.metadata or {}).get(b"units") for field in pyarrow.table(result).schema}
-    assert units["rms_error_rad"] == b"rad" and units["iae_rad_s"] == b"rad s" and units["certified"] is None
+    assert (
+        units["rms_error_rad"] == b"rad"
+        and units["iae_rad_s"] == b"rad s"
+        and units["certified_continuous_time"] is None
+    )
     assert polars.DataFrame(result)["rms_error_rad"].to_list() == expected
     assert isinstance(pandas.DataFrame.from_arrow(result), pandas.DataFrame)
 
@@ -474,8 +478,8 @@ def test_a_refusal_is_raised_once_and_names_the_lowest_row_that_ran(short):
 
 
 def test_certified_cannot_be_minimised(short):
-    with pytest.raises(ValueError, match="certified cannot be minimised"):
-        clutch.sweep(short, {"law.smc.kp_v": [0.1, 3.0]}).best("certified")
+    with pytest.raises(ValueError, match="certified_continuous_time cannot be minimised"):
+        clutch.sweep(short, {"law.smc.kp_v": [0.1, 3.0]}).best("certified_continuous_time")
 
 
 def test_traces_that_no_law_has_are_refused_also_where_the_law_is_swept(short):
@@ -506,7 +510,7 @@ def test_a_sweep_without_a_finished_row_still_has_its_forms(short, monkeypatch):
     found = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0], "run.engine": ["auto", "exact_flow"]})
     assert found.interrupted and len(found) == 0
     assert found.table["error"] == [] and found.table["run.engine"] == []
-    assert found.table["certified"].dtype == bool
+    assert found.table["certified_continuous_time"].dtype == bool
     assert np.isnan(found.to_xarray()["max_error_rad"]).all()
     assert pickle.loads(pickle.dumps(found.table)) == found.table
     assert found.to_arrow().num_rows == 0

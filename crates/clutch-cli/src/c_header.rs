@@ -37,12 +37,9 @@ impl HeaderVerb {
         let scenario = self.scenario.load()?;
         match check(&scenario, None, self.uncertified, None) {
             Ok(_) => {}
-            Err(ClearanceError::NotCertified { .. }) => {
+            Err(ClearanceError::NotCertified { lack, .. }) => {
                 let file = self.scenario.scenario.display();
-                let refusal = format!(
-                    "{}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was printed.",
-                    scenario.name()
-                );
+                let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
                 let advice =
                     format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
                 warn(&(paragraph(&refusal) + &paragraph(&advice)))?;

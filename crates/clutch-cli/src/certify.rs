@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 /// Checks a scenario's gains against every plant within its bounds.
 ///
 /// Prints three verdicts apart: on the error, in continuous time and as sampled; on the linear stability of the sampled
-/// loop; on sticks, which neither excludes. Exit code 0: certified in continuous time, with --sampled or --check as sampled and
-/// linearly stable; 2: not certified.
+/// loop; on sticks, which neither excludes. Exit code 0: certified in continuous time and not known to be unstable as sampled,
+/// with --sampled or --check as sampled and linearly stable; 2: not so.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n  \
     clutch certify pd_2 --set bounds.friction_percent=40 --sampled --save pd.json\n\n\
@@ -66,7 +66,7 @@ impl Certify {
             eprintln!("{}: not written: nothing is proven", file.display());
         }
         let certified = match bound {
-            Bound::NotLookedFor => plan.certificate.certified(),
+            Bound::NotLookedFor => plan.certificate.certified() && !sampled.runs_away(),
             _ => bound.proven().is_some() && sampled.bound_suffices(),
         };
         Ok(if certified { Exit::Done } else { Exit::NotCertified })

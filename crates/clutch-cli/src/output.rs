@@ -52,11 +52,15 @@ pub const BUILD: &str = env!("CLUTCH_BUILD");
 /// Says that nothing was started, and what to do.
 #[cfg(target_os = "linux")]
 pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
-    let advice = format!(
-        "`clutch certify {}` says why; --certificate takes a proof of the sampled loop, which `clutch certify --sampled --save` \
-         and `clutch tune --save` write; --uncertified runs it all the same.",
-        file.display()
-    );
+    use clutch_loop::clearance::{ClearanceError, Lack};
+    let unstable = matches!(refusal, ClearanceError::NotCertified { lack: Lack::Unstable(_), .. });
+    let other = if unstable {
+        "smaller gains, or a velocity that smooths less, make it stable;"
+    } else {
+        "--certificate takes a proof of the sampled loop, which `clutch certify --sampled --save` and `clutch tune --save` write;"
+    };
+    let advice =
+        format!("`clutch certify {}` says why; {other} --uncertified runs it all the same.", file.display());
     paragraph(&refusal.to_string()) + &paragraph(&advice)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::output::paragraph;
 use clutch_certificate::file;
-use clutch_sim::scenario::{CertificateError, Proven, Sampled, Unproven};
+use clutch_sim::scenario::{CertificateError, Proven, STICKS, Sampled, Unproven};
 use serde_json::{Value, json as value};
 use std::path::Path;
 
@@ -64,9 +64,6 @@ impl Bound {
     }
 }
 
-/// Questions that no verdict answers.
-const STICKS: &str = "sticks: not excluded, neither by a bound nor by stability";
-
 /// The verdicts of a run for which no bound was looked for, a paragraph each.
 pub(crate) fn short_lines(sampled: &Sampled) -> String {
     let verdicts = match &sampled.setup {
@@ -77,7 +74,7 @@ pub(crate) fn short_lines(sampled: &Sampled) -> String {
         Err(why) => vec![why.to_string()],
     };
     let gains: String = verdicts.iter().map(|v| paragraph(&format!("gains, as sampled: {v}"))).collect();
-    gains + &paragraph(STICKS)
+    gains + &paragraph(&format!("sticks: {STICKS}"))
 }
 
 /// The verdicts, a paragraph each.
@@ -99,7 +96,7 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
         Ok(_) => sampled.stability_line(),
         Err(_) => "nothing is said of linear stability either".to_owned(),
     };
-    [format!("as sampled: {error}"), format!("as sampled: {stability}"), STICKS.to_owned()]
+    [format!("as sampled: {error}"), format!("as sampled: {stability}"), format!("sticks: {STICKS}")]
         .map(|verdict| paragraph(&verdict))
         .concat()
 }

@@ -1,6 +1,6 @@
 //! May a scenario run on a board?
 
-use clutch_sim::scenario::{CertificateError, Plan, Proven, Sampled};
+use clutch_sim::scenario::{CertificateError, Plan, Proven, STICKS, Sampled};
 use clutch_sim::{Scenario, ScenarioError, Start};
 use std::path::{Path, PathBuf};
 
@@ -11,15 +11,12 @@ pub enum ClearanceError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The gains are not certified, and were not asked for all the same.
-    #[error(
-        "{scenario}: the gains are not certified, in continuous time{}, for these bounds and this path, so nothing was started.",
-        if *.unstable { ", and the sampled loop is linearly unstable" } else { "" }
-    )]
+    #[error("{scenario}: {lack}, so nothing was started.")]
     NotCertified {
         /// The scenario's name.
         scenario: String,
-        /// True if there is a bound of the sampled loop, which is linearly unstable.
-        unstable: bool,
+        /// What is missing.
+        lack: Lack,
     },
     /// The sampled loop's certificate is none of this scenario's.
     #[error(
@@ -38,6 +35,23 @@ pub enum ClearanceError {
         /// The file.
         path: PathBuf,
     },
+}
+
+/// What keeps gains from a board.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Lack {
+    /// No certificate in continuous time, and none of the sampled loop was given.
+    #[error("the gains are not certified, in continuous time, for these bounds and this path")]
+    Certificate,
+    /// A bound of the sampled loop, of which nobody knows whether it is linearly stable.
+    #[error(
+        "the gains are not certified, in continuous time, for these bounds and this path, and whether the sampled loop is \
+         linearly stable is not known"
+    )]
+    Stability,
+    /// The sampled loop is linearly unstable.
+    #[error("the sampled loop is linearly unstable, with a spectral radius up to {0:.3}")]
+    Unstable(f64),
 }
 
 /// A scenario that may run on a board.
@@ -60,11 +74,37 @@ impl Cleared {
             None => "the bound of the error is uncertified: no certificate was given".to_owned(),
         }
     }
+
+    /// The verdicts, each by its name in a log.
+    #[must_use]
+    pub fn verdicts(&self) -> [(String, String); 4] {
+        [
+            ("certified_continuous_time", self.plan.certificate.certified().to_string()),
+            ("as_sampled", self.bound_line()),
+            ("linear_stability", self.sampled.stability_line()),
+            ("sticks", STICKS.to_owned()),
+        ]
+        .map(|(name, verdict)| (name.to_owned(), verdict))
+    }
+}
+
+impl Lack {
+    /// What keeps a scenario from a board; none if nothing does.
+    fn of(plan: &Plan, sampled: &Sampled, proven: bool) -> Option<Self> {
+        if let Some(radius) = sampled.radius().filter(|_| sampled.runs_away()) {
+            return Some(Lack::Unstable(radius));
+        }
+        match plan.certificate.certified() {
+            true => None,
+            false if !proven => Some(Lack::Certificate),
+            false => (!sampled.bound_suffices()).then_some(Lack::Stability),
+        }
+    }
 }
 
 /// Checks a scenario for a run on a board: there is a safe state, a brake can follow the path, a certificate that is given
-/// holds and is the scenario's, the gains are certified, by it or in continuous time, or uncertified ones were asked for, and
-/// the log is a new file.
+/// holds and is the scenario's, the gains are certified, by it or in continuous time, and the sampled loop is not known to be
+/// linearly unstable, or uncertified ones were asked for, and the log is a new file.
 ///
 /// # Errors
 /// The first of these that does not hold.
@@ -81,10 +121,8 @@ pub fn check(
     if proven.is_some() && scenario.spec().run.start != Start::Rest {
         return Err(ClearanceError::CertifiedInMotion);
     }
-    let certified = plan.certificate.certified() || (proven.is_some() && sampled.bound_suffices());
-    if !certified && !uncertified {
-        let unstable = proven.is_some();
-        return Err(ClearanceError::NotCertified { scenario: scenario.name().to_owned(), unstable });
+    if let Some(lack) = Lack::of(&plan, &sampled, proven.is_some()).filter(|_| !uncertified) {
+        return Err(ClearanceError::NotCertified { scenario: scenario.name().to_owned(), lack });
     }
     match log {
         Some(path) if path.exists() => Err(ClearanceError::LogExists { path: path.to_owned() }),

@@ -1,7 +1,7 @@
 //! A session with a board controller in lockstep: the board's own image, and the simulated rig as its encoder and
 //! converter, in virtual time.
 
-use crate::clearance::check;
+use crate::clearance::{Cleared, check};
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
@@ -51,19 +51,19 @@ impl LockstepOptions {
         looking.map(|looking| looking.begin(&self.header(scenario, servo, board), scenario))
     }
 
-    /// Writes the log of a run, if one is wanted: `on` is the kind of board, and whether the gains are certified.
+    /// Writes the log of a run, if one is wanted: `on` is the kind of board, and what is known of the gains.
     pub(crate) fn write_log<T: Real>(
         &self,
         scenario: &Scenario,
         servo: &Servo<T>,
-        (board, certified): (&str, bool),
+        (board, cleared): (&str, &Cleared),
         report: &VirtualReport,
     ) -> Result<(), SessionError> {
         let Some(file) = &self.log else { return Ok(()) };
         let mut header = self.header(scenario, servo, board);
         header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
         header.extra.push(("board".to_owned(), "emulated".to_owned()));
-        header.extra.push(("certified".to_owned(), certified.to_string()));
+        header.extra.extend(cleared.verdicts());
         let mut log = LogWriter::create(file, &header)?;
         for record in &report.records {
             log.write(record)?;
@@ -92,7 +92,7 @@ pub enum LockstepError {
 pub struct LockstepSession {
     scenario: Scenario,
     options: LockstepOptions,
-    certified: bool,
+    cleared: Cleared,
     changed: bool,
     looking: Option<Looking>,
 }
@@ -107,8 +107,7 @@ impl LockstepSession {
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
         let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
-        let certified = cleared.plan.certificate.certified();
-        Ok(LockstepSession { scenario, options, certified, changed, looking: None })
+        Ok(LockstepSession { scenario, options, cleared, changed, looking: None })
     }
 
     /// The same with one that looks on.
@@ -160,7 +159,7 @@ impl LockstepSession {
         let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
         let played = o.played(self.looking.as_ref(), scenario, &built.servo, "emulated board");
         let report = on_rig?.played(played).run(&path)?;
-        self.options.write_log(scenario, &built.servo, ("emulated board", self.certified), &report)?;
+        self.options.write_log(scenario, &built.servo, ("emulated board", &self.cleared), &report)?;
         Ok(report)
     }
 }

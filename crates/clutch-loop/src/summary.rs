@@ -7,6 +7,7 @@ use crate::realtime::CycleSummary;
 use crate::sim_board_server::ServeReport;
 use clutch_core::supervisor::{Cause, State};
 use clutch_sim::number;
+use clutch_sim::scenario::STICKS;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +37,7 @@ impl Verdict {
     }
 }
 
-/// The verdict on the error of the sampled loop.
+/// The verdicts on the sampled loop.
 #[derive(Clone, Debug)]
 pub struct SampledSummary {
     /// Bound on `|e|`, if a certificate was given, rad.
@@ -45,6 +46,12 @@ pub struct SampledSummary {
     pub verdict: String,
     /// The certificate's file.
     pub certificate: Option<PathBuf>,
+    /// Spectral radii with the weakest, a middle and the strongest actuator, if they are known.
+    pub spectral_radius: Option<[f64; 3]>,
+    /// True if small deviations die out, if that is known.
+    pub stable: Option<bool>,
+    /// The verdict on linear stability in words.
+    pub stability: String,
 }
 
 impl SampledSummary {
@@ -55,6 +62,9 @@ impl SampledSummary {
             error_bound: cleared.proven.as_ref().map(|proven| proven.checked.error_bound),
             verdict: cleared.bound_line(),
             certificate: certificate.map(Path::to_owned),
+            spectral_radius: cleared.sampled.stability.map(|radii| radii.map(|s| s.radius)),
+            stable: cleared.sampled.stable(),
+            stability: cleared.sampled.stability_line(),
         }
     }
 }
@@ -77,7 +87,7 @@ pub struct Summary {
     pub version: String,
     /// True if the gains are certified, in continuous time, for the scenario's bounds.
     pub certified: bool,
-    /// The verdict on the error of the sampled loop.
+    /// The verdicts on the sampled loop.
     pub sampled: SampledSummary,
     /// True if somebody here has stopped it.
     pub stopped: bool,
@@ -123,7 +133,11 @@ impl Summary {
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
-        let mut lines = vec![format!("as sampled: {}", self.sampled.verdict)];
+        let mut lines = vec![
+            format!("as sampled: {}", self.sampled.verdict),
+            format!("as sampled: {}", self.sampled.stability),
+            format!("sticks: {STICKS}"),
+        ];
         lines.push(format!("{}: {}", r.drift.label(), r.drift.words()));
         lines.extend(r.drift.alarm_line());
         if r.clock_hz > 0 {
@@ -224,11 +238,14 @@ impl Summary {
             "cause": format!("{:?}", r.cause),
             "cause_text": self.cause_text(),
             "value": r.value,
-            "certified": self.certified,
+            "certified_continuous_time": self.certified,
             "sampled": {
                 "error_bound_rad": self.sampled.error_bound,
                 "verdict": self.sampled.verdict,
                 "certificate": self.sampled.certificate,
+                "spectral_radius": self.sampled.spectral_radius,
+                "stable": self.sampled.stable,
+                "sticks_excluded": false,
             },
             "ticks": r.ticks,
             "metrics": r.metrics,

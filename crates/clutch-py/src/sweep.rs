@@ -83,8 +83,9 @@ impl Sweep {
         let known: Vec<&str> =
             figure_columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
         for name in &metrics {
-            if name != "certified" && !known.contains(&name.as_str()) {
-                let text = format!("metrics: \"{name}\": expected certified, {}", known.join(", "));
+            if name != "certified_continuous_time" && !known.contains(&name.as_str()) {
+                let text =
+                    format!("metrics: \"{name}\": expected certified_continuous_time, {}", known.join(", "));
                 return Err(PyValueError::new_err(text));
             }
         }
@@ -198,7 +199,7 @@ impl Sweep {
             columns.push(("row".to_owned(), Column::own(row)));
             for (m, name) in self.metrics.iter().enumerate() {
                 let values = rows.values().map(|r| r.metrics[m]);
-                let column = if name == "certified" {
+                let column = if name == "certified_continuous_time" {
                     Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
                 } else {
                     Column::own(values.collect::<Vec<f64>>())
@@ -232,7 +233,11 @@ fn row(
             let value = |name: &String| {
                 let found =
                     figure_columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
-                if name == "certified" { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
+                if name == "certified_continuous_time" {
+                    f64::from(u8::from(certified))
+                } else {
+                    found.unwrap_or(f64::NAN)
+                }
             };
             let metrics = metrics.iter().map(value).collect();
             let trace = (!traces.is_empty()).then(|| {
@@ -244,7 +249,7 @@ fn row(
             Row { metrics, error: None, trace }
         }
         Err(e) => {
-            let nothing = |name: &String| if name == "certified" { 0.0 } else { f64::NAN };
+            let nothing = |name: &String| if name == "certified_continuous_time" { 0.0 } else { f64::NAN };
             Row { metrics: metrics.iter().map(nothing).collect(), error: Some(e), trace: None }
         }
     }

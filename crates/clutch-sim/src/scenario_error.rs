@@ -21,7 +21,11 @@ impl fmt::Display for ScenarioError {
         match (self.key.is_empty(), self.value.is_empty()) {
             (true, _) => write!(f, "{}", self.message),
             (false, true) => write!(f, "{}: {}", self.key, self.message),
-            (false, false) => write!(f, "{} = {}: {}", self.key, self.value, self.message),
+            // A value may have line breaks, with which it would look like lines of the program's own.
+            (false, false) => {
+                let value = self.value.replace('\n', "\\n").replace('\r', "\\r");
+                write!(f, "{} = {value}: {}", self.key, self.message)
+            }
         }
     }
 }

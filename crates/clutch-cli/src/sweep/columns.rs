@@ -21,7 +21,7 @@ enum Cells {
 impl Cells {
     /// Column of a key with these values.
     fn of(axis: &Over) -> Cells {
-        let all = |is: fn(&Value) -> bool| axis.values.iter().all(is);
+        let all = |is: fn(&Value) -> bool| axis.values.all(is);
         if all(|value| matches!(value, Value::Integer(_))) {
             Cells::Whole(Vec::new())
         } else if all(|value| matches!(value, Value::Integer(_) | Value::Float(_))) {
@@ -98,7 +98,7 @@ impl Grid {
                 about.iter().find(|(figure, _)| *figure == name).map_or(("", ""), |(_, about)| *about);
             add(name, Cells::Real(Vec::new()), about);
         }
-        add("certified", Cells::Flag(Vec::new()), ("", ""));
+        add("certified_continuous_time", Cells::Flag(Vec::new()), ("", ""));
         add("error", Cells::Text(Vec::new()), ("", ""));
         columns
     }

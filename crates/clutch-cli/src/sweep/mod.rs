@@ -31,8 +31,8 @@ use std::time::Instant;
 #[command(
     after_help = "Example:\n  clutch sweep pd_2 --over law.pd.kp_v_rad=500:5000:50 \\\n      --over law.pd.kd_v_s_rad=5,10,20,50 \
     --seeds 10 --out pd.csv\n\n\
-    Columns are the keys in the units of their names, then figures in SI units and radians (docs/scenario.md), `certified` in \
-    continuous time, and `error`, the reason where a row is refused."
+    Columns are the keys in the units of their names, then figures in SI units and radians (docs/scenario.md), `certified_continuous_time`, \
+    and `error`, the reason where a row is refused."
 )]
 pub(crate) struct SweepVerb {
     #[command(flatten)]
@@ -93,6 +93,15 @@ impl Values {
         match self {
             Values::Listed(list) => list[i as usize].clone(),
             Values::Seeds(_) => Value::Integer(i as i64 + 1),
+        }
+    }
+
+    /// True if each value is such a one.
+    #[cfg(feature = "parquet")]
+    fn all(&self, is: fn(&Value) -> bool) -> bool {
+        match self {
+            Values::Listed(list) => list.iter().all(is),
+            Values::Seeds(_) => is(&self.at(0)),
         }
     }
 }
@@ -182,7 +191,7 @@ impl Grid {
         let keys = self.axes.iter().map(|axis| axis.key.clone());
         let figures = figures(&Metrics::default(), &Detected::default());
         keys.chain(figures.into_iter().map(|(name, _)| name.to_owned()))
-            .chain(["certified".into(), "error".into()])
+            .chain(["certified_continuous_time".into(), "error".into()])
             .collect()
     }
 

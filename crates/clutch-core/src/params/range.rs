@@ -115,7 +115,9 @@ impl fmt::Display for Words {
             Kind::Real => "number",
             Kind::Whole => "whole number",
             Kind::Switch => return f.write_str("true or false"),
-            Kind::Text => return f.write_str("a text in quotes"),
+            Kind::Text => {
+                return f.write_str("a text in quotes, without line breaks and other control characters");
+            }
             Kind::Points => {
                 write!(f, "a list of at least one pair [{text}] of finite numbers, with ")?;
                 let (of, unit) = if text.starts_with('s') { ("times", "s") } else { ("angles", "°") };

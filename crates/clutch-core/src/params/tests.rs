@@ -178,7 +178,10 @@ fn a_blank_table_has_nothing_that_could_be_taken_for_a_value() {
 fn each_kind_of_value_has_its_words() {
     let words = |kind, range: Range, unit: &Unit, si| range.words(kind, unit, si).to_string();
     assert_eq!(words(Kind::Switch, Range::ANY, &NONE, false), "true or false");
-    assert_eq!(words(Kind::Text, Range::ANY, &NONE, false), "a text in quotes");
+    assert_eq!(
+        words(Kind::Text, Range::ANY, &NONE, false),
+        "a text in quotes, without line breaks and other control characters"
+    );
     let row = Kinds::<f64>::TABLE.rows.get(4).unwrap();
     assert_eq!(words(row.kind, row.range, &row.unit, false), "one of: brake, motor, both");
     let points = "a list of at least one pair [s, °] of finite numbers, with times that rise";

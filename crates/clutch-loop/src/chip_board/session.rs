@@ -1,7 +1,7 @@
 //! A session with a board whose image runs on the model of its chip, in virtual time.
 
 use super::{ChipBoard, ChipFault, ChipKind, Counted};
-use crate::clearance::check;
+use crate::clearance::{Cleared, check};
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
 use crate::onlooker::Looking;
@@ -67,7 +67,7 @@ pub struct ChipSession {
     options: LockstepOptions,
     chip: ChipOptions,
     role: ChipRole,
-    certified: bool,
+    cleared: Cleared,
     changed: bool,
     looking: Option<Looking>,
 }
@@ -90,8 +90,7 @@ impl ChipSession {
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
         let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
-        let certified = cleared.plan.certificate.certified();
-        Ok(ChipSession { scenario, options, chip, role, certified, changed, looking: None })
+        Ok(ChipSession { scenario, options, chip, role, cleared, changed, looking: None })
     }
 
     /// The same with one that looks on.
@@ -187,8 +186,7 @@ impl ChipSession {
         let played = o.played(self.looking.as_ref(), &self.scenario, &built.servo, &chip);
         let mut on_chip = VirtualLoop::with_board(board?, params, station).played(played);
         let ran = on_chip.run(path)?;
-        let certified = self.certified;
-        o.write_log(&self.scenario, &built.servo, (&chip, certified), &ran)?;
+        o.write_log(&self.scenario, &built.servo, (&chip, &self.cleared), &ran)?;
         Ok((ran, on_chip.into_board()))
     }
 }

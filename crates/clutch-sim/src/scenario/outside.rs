@@ -60,6 +60,23 @@ impl Scenario {
         Ok(lines.0)
     }
 
+    /// The fall of the rig's friction from rest, if it is slower than the one that a bound as sampled takes: `[model]`'s.
+    pub(super) fn slower_fall(&self, [velocity, exponent]: [f64; 2]) -> Option<String> {
+        let rig = Rig::new(&self.params.rig, self.params.run.seed).ok()?;
+        let friction = rig.model.plant.friction();
+        let fall = friction.falls().filter(|_| friction.at_rest() > friction.sliding())?;
+        let slower = fall.velocity > velocity * (1.0 + 1e-9) || fall.exponent < exponent - 1e-9;
+        slower.then(|| {
+            format!(
+                "its friction falls with v_s {} rad/s, δ {}, slower than v_s {} rad/s, δ {} of model.friction",
+                number(fall.velocity),
+                number(fall.exponent),
+                number(velocity),
+                number(exponent)
+            )
+        })
+    }
+
     /// The drive's torque, with that at random on it.
     fn drive(&self, rig: &Rig, bounds: &Bounds, lines: &mut Outside) {
         let (low, high) = rig.drive.range();

@@ -9,6 +9,9 @@ use clutch_certificate::{Certificate, Gains, Options, Setup, Stability, largest,
 use clutch_core::Bounds;
 use std::path::Path;
 
+/// The verdict on sticks.
+pub const STICKS: &str = "not excluded, neither by a bound nor by stability";
+
 /// Verdicts on a sampled loop that cost nothing, and the box for the one that does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
@@ -16,6 +19,8 @@ pub struct Sampled {
     pub setup: Result<Setup, NotCovered>,
     /// Spectral radii with the weakest, a middle and the strongest brake.
     pub stability: Option<[Stability; 3]>,
+    /// The fall of the rig's friction from rest, if it is slower than the one of which a bound speaks.
+    pub slower_fall: Option<String>,
 }
 
 /// A bound on the error that the checker has passed.
@@ -79,7 +84,7 @@ impl Sampled {
     pub fn prove(&self) -> Result<(Proven, Certificate), Unproven> {
         let setup = self.setup.as_ref().map_err(NotCovered::clone)?;
         // A shell holds whatever law is within, stable or not.
-        if self.stable() == Some(false) && !self.any_law() {
+        if self.runs_away() {
             return Err(Unproven::Unstable);
         }
         let found = search(setup, &Options::default(), false);
@@ -100,7 +105,19 @@ impl Sampled {
     /// Small deviations die out, with the weakest, a middle and the strongest brake; none where nothing is known.
     #[must_use]
     pub fn stable(&self) -> Option<bool> {
-        self.stability.as_ref().map(|radii| largest(radii) < 1.0)
+        self.radius().map(|radius| radius < 1.0)
+    }
+
+    /// The largest of the spectral radii, if they are known.
+    #[must_use]
+    pub fn radius(&self) -> Option<f64> {
+        self.stability.as_ref().map(largest)
+    }
+
+    /// True if small deviations grow, and no shell holds them.
+    #[must_use]
+    pub fn runs_away(&self) -> bool {
+        self.stable() == Some(false) && !self.any_law()
     }
 
     /// True if any law stands within a shell.
@@ -145,8 +162,10 @@ impl Sampled {
     pub fn bound_line(&self, proven: &Proven) -> String {
         let Proven { checked, cells } = proven;
         let law = if self.any_law() { " with any inner law" } else { "" };
+        let slower =
+            self.slower_fall.as_ref().map_or(String::new(), |fall| format!("; not of this rig: {fall}"));
         format!(
-            "|e| stays below {} °{law}, proven in {cells} {} of mu_d, the weakest {:.4} … {:.4} [{}]",
+            "|e| stays below {} °{law}, proven in {cells} {} of mu_d, the weakest {:.4} … {:.4} [{}]{slower}",
             number(checked.error_bound.to_degrees()),
             if *cells == 1 { "cell" } else { "cells" },
             checked.limiting[0],
@@ -297,6 +316,7 @@ impl Scenario {
             gains.and_then(|law| stability(&Setup { law, ..s.clone() }))
         };
         let stability = setup.as_ref().ok().and_then(within);
-        Sampled { setup, stability }
+        let slower_fall = setup.as_ref().ok().and_then(|s| self.slower_fall(s.stribeck));
+        Sampled { setup, stability, slower_fall }
     }
 }

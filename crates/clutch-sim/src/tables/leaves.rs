@@ -7,7 +7,7 @@ use clutch_core::params::{Editor, Kind, Leaf, Range, Table, Unit};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points(pub Vec<(f64, f64)>);
 
-/// A text.
+/// A text of one line: what is shown of it cannot look like lines of the program's own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Text(pub String);
 
@@ -24,8 +24,9 @@ impl Points {
 }
 
 impl Text {
+    /// The place (from 0) of the first control character.
     fn wrong(&self, _: &Range, _: &Unit) -> Option<usize> {
-        None
+        self.0.chars().position(char::is_control)
     }
 }
 
