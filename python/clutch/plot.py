@@ -786,7 +786,7 @@ def certificate_region(
         markerfacecolor=_RED if good else "white",
         label=f"{named}: {'certified' if good else 'not certified'}",
     )
-    patch = Patch(facecolor=_PALE, edgecolor=_BLUE, linewidth=0.7, label="certified, continuous time")
+    patch = Patch(facecolor=_PALE, edgecolor=_BLUE, linewidth=0.7, label="certified")
     ax.legend(handles=[patch, dot], ncols=2, **_ABOVE)
     _gain_axis(ax, "x", keys[0], gains[0])
     _gain_axis(ax, "y", keys[1], gains[1])

@@ -60,7 +60,7 @@ def test_the_summary_is_the_commands(clutch):
     ours = {**vars(result), "scenario": result.scenario.name}
     beside = {"scenario", "log", "announcement", "_text", "metrics"}
     assert set(ours) - beside == set(command) - {"scenario", "metrics", "detected"}
-    same = "scenario verdict state cause cause_text value certified ticks bad_frames untold log_dropped"
+    same = "scenario verdict state cause cause_text value certified_continuous_time ticks bad_frames untold log_dropped"
     for name in (*same.split(), "cut_writes", "board_safe", "port_error", "tick_clock_cycles"):
         assert ours[name] == command[name], name
     # Outside of a checkout a build does not know the commit.

@@ -52,7 +52,7 @@ def assert_rows_are_single_runs(base, result):
         figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["row"][i]], strict=True)))
         for name in FIGURES:
             np.testing.assert_array_equal(result.table[name][i], figures[name], err_msg=f"row {i}: {name}")
-        assert result.table["certified_continuous_time"][i] == bool(run.scenario.certificate())
+        assert result.table["certified_continuous_time"][i] == run.scenario.certificate().certified
 
 
 # --- Rows to run -------------------------------------------------------------------------------
