@@ -59,6 +59,8 @@ if TYPE_CHECKING:
     from clutch._sweep import samples as samples
     from clutch._sweep import sobol as sobol
     from clutch._sweep import sweep as sweep
+    from clutch._sweep_file import SweptFile as SweptFile
+    from clutch._sweep_file import sweep_to_file as sweep_to_file
     from clutch._tables import *  # noqa: F403
     from clutch._tune import Candidate as Candidate
     from clutch._tune import Estimate as Estimate
@@ -84,6 +86,7 @@ _MODULES = {
     "_run": ["Result", "SteppedLaw", "simulate"],
     "_smooth": ["SmoothSpeed", "lowest_smooth_speed"],
     "_sweep": ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"],
+    "_sweep_file": ["SweptFile", "sweep_to_file"],
     "_tune": ["Candidate", "Estimate", "Identified", "Tuned", "identify", "tune"],
 }
 _WHERE = {name: (module, name) for module, names in _MODULES.items() for name in names}

@@ -404,15 +404,9 @@ def sweep(
     [55.5, 0.0]
     """
     scenario = as_scenario(base)
-    if isinstance(parameters, Samples):
-        chosen = parameters
-    else:
-        chosen = grid(parameters) if isinstance(parameters, Mapping) else samples(parameters)
-    drawn = () if seeds is None else _seeds(seeds)
+    chosen, drawn = _chosen(parameters, seeds)
     if progress is not None and not isinstance(progress, bool) and not callable(progress):
         raise TypeError(f"progress = {progress!r}: expected True, False, None or a function")
-    if drawn:
-        chosen = chosen._crossed("run.seed", drawn)
     if errors not in ("raise", "keep"):
         raise ValueError(f"errors: expected 'raise' or 'keep', got {errors!r}")
     if every < 1 or (chunk is not None and chunk < 1) or (threads is not None and threads < 1):
@@ -447,9 +441,19 @@ def sweep(
         table=finished.table(work.metrics),
         metrics=tuple(work.metrics),
         traces=dict(sorted(finished.traces().items())),
-        seeds=max(1, len(drawn)),
+        seeds=drawn,
         interrupted=interrupted,
     )
+
+
+def _chosen(parameters: Any, seeds: int | Iterable[int] | None) -> tuple[Samples, int]:
+    """The runs that parameters and seeds mean, and the number of seeds of each."""
+    if isinstance(parameters, Samples):
+        chosen = parameters
+    else:
+        chosen = grid(parameters) if isinstance(parameters, Mapping) else samples(parameters)
+    drawn = () if seeds is None else _seeds(seeds)
+    return chosen._crossed("run.seed", drawn) if drawn else chosen, max(1, len(drawn))
 
 
 def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:

@@ -97,6 +97,14 @@ def test_a_sweep_with_an_own_law_gives_each_run_a_fresh_copy():
     assert there.table["rms_error_rad"].tolist() == here.table["rms_error_rad"].tolist()
 
 
+def test_answers_that_are_no_numbers_are_told():
+    def lost(tick):
+        return math.nan if tick.error_rad > 0 else 2.24
+
+    with pytest.warns(UserWarning, match=r"lost answered no finite number in \d+ of 5000 periods: the output was"):
+        clutch.simulate("pd_2", law=lost)
+
+
 def test_a_refused_row_of_such_a_sweep_is_kept_or_raised():
     rows = {"run.duration_s": [2.0, -1.0]}
     with pytest.raises(clutch.ParamError, match="row 1: "):

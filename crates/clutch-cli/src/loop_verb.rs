@@ -323,39 +323,45 @@ pub fn summary(s: &Summary) -> String {
     // A board whose clock waits for this machine says nothing of it.
     let measured = r.wake.count > 0;
     let late = if measured { latency(&r.wake) } else { "not measured".to_owned() };
-    let title = format!(
-        "{}\n{} ticks; figures over {} s after settling, from the encoder",
-        s.scenario,
-        r.ticks,
-        number(m.measured_s)
-    );
+    let settled = m.measured_s > 0.0;
+    let over = if settled {
+        format!("figures over {} s after settling, from the encoder", number(m.measured_s))
+    } else {
+        "no figures: the run ended before run.settle_s".to_owned()
+    };
+    let figures = [
+        row(&Metrics::MAX_ERROR, m),
+        row(&Metrics::RMS_ERROR, m),
+        row(&Metrics::MEAN_ERROR, m),
+        row(&Detected::STICK_SLIP, d),
+        (Detected::TOLD.label, d.words(), Detected::TOLD.shown_unit),
+        row(&Detected::STICK_TIME, d),
+        row(&Detected::STAIRS, d),
+        row(&Metrics::VARIATION, m),
+    ];
     let mut text = quantities(
-        &title,
+        &format!("{}\n{} ticks; {over}", s.scenario, r.ticks),
         &[
-            row(&Metrics::MAX_ERROR, m),
-            row(&Metrics::RMS_ERROR, m),
-            row(&Metrics::MEAN_ERROR, m),
-            row(&Detected::STICK_SLIP, d),
-            (Detected::TOLD.label, d.words(), Detected::TOLD.shown_unit),
-            row(&Detected::STICK_TIME, d),
-            row(&Detected::STAIRS, d),
-            row(&Metrics::VARIATION, m),
-            ("samples received", r.link.received.to_string(), ""),
-            ("samples lost", r.lost.to_string(), ""),
-            (
-                "samples late / twice / out of order",
-                format!("{} / {} / {}", r.link.late, r.link.duplicated, r.link.reordered),
-                "",
-            ),
-            ("frames with errors", r.link.bad_frames.to_string(), ""),
-            ("samples not believed", r.implausible.to_string(), ""),
-            ("deadline misses", r.deadline_misses.to_string(), ""),
-            ("answer after p50 / p99 / p99.9 / max", latency(&r.response), "µs"),
-            ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
-            ("wake-up late by p50 / p99 / p99.9 / max", late, if measured { "µs" } else { "" }),
-        ],
+            if settled { &figures[..] } else { &[] },
+            &[
+                ("samples received", r.link.received.to_string(), ""),
+                ("samples lost", r.lost.to_string(), ""),
+                (
+                    "samples late / twice / out of order",
+                    format!("{} / {} / {}", r.link.late, r.link.duplicated, r.link.reordered),
+                    "",
+                ),
+                ("frames with errors", r.link.bad_frames.to_string(), ""),
+                ("samples not believed", r.implausible.to_string(), ""),
+                ("deadline misses", r.deadline_misses.to_string(), ""),
+                ("answer after p50 / p99 / p99.9 / max", latency(&r.response), "µs"),
+                ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
+                ("wake-up late by p50 / p99 / p99.9 / max", late, if measured { "µs" } else { "" }),
+            ],
+        ]
+        .concat(),
     );
-    if let Some(reason) = d.reason() {
+    if let Some(reason) = d.reason().filter(|_| settled) {
         text += &paragraph(&format!("stick-slip: {reason}"));
     }
     text.extend(s.remarks().iter().map(|line| paragraph(line)));

@@ -57,7 +57,10 @@ impl Info {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (s, h) = (&self.scanned, &self.scanned.header);
-        writeln!(f, "{}: {}", self.path.display(), s.tail)?;
+        let places = if s.damaged == 1 { "place" } else { "places" };
+        let damaged =
+            if s.damaged > 0 { format!("DAMAGED in {} {places}, else ", s.damaged) } else { String::new() };
+        writeln!(f, "{}: {damaged}{}", self.path.display(), s.tail)?;
         writeln!(f, "  {} of {} by clutch {}", h.source, Quoted(&h.scenario_name), Quoted(&h.version))?;
         writeln!(
             f,
@@ -91,7 +94,7 @@ impl fmt::Display for Info {
             write!(f, "\n  {} bytes cannot be read", s.left_out_bytes)?;
         }
         if let Some(damage) = &s.damage {
-            write!(f, "\n  {} damaged places; the first: {damage}", s.damaged)?;
+            write!(f, "\n  {} damaged {places}; the first: {damage}", s.damaged)?;
         }
         if !s.checked && s.damaged == 0 {
             write!(f, "\n  the header has no checksum: an older version wrote it")?;

@@ -55,6 +55,15 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
     let asked_for = Session::new(weak, SessionOptions { uncertified: true, ..options.clone() }).unwrap();
     assert!(!asked_for.certified());
 
+    // Certified in continuous time, and linearly unstable as sampled.
+    let unstable = scenario("board_smc_2", &[("law", "{ pd = {} }"), ("rig.delay_ticks", "1")]);
+    assert!(unstable.plan().unwrap().certificate.certified());
+    let refusal = refused(unstable.clone(), options.clone());
+    let said =
+        "the sampled loop is linearly unstable, with a spectral radius up to 1.057, so nothing was started.";
+    assert!(refusal.to_string().ends_with(said), "{refusal}");
+    assert!(Session::new(unstable, SessionOptions { uncertified: true, ..options.clone() }).is_ok());
+
     let refusal = refused(scenario("pd_2", &[]), options.clone());
     assert!(refusal.to_string().contains("a run on a board needs a safe state"), "{refusal}");
 
@@ -84,6 +93,43 @@ fn a_board_that_closes_the_loop_gets_a_scenario_in_single_precision() {
     assert_eq!(session.scenario().canonical(), scenario("board_smc_2", &set).canonical());
     let session = Session::new(double.clone(), self::options()).unwrap();
     assert_eq!(session.scenario().canonical(), double.canonical());
+}
+
+#[test]
+fn limits_that_a_sound_shaft_will_meet_are_remarked_before_it_begins() {
+    let remarks = |set: &[(&str, &str)]| {
+        let set = [set, &[("run.duration_s", "0.3"), ("run.settle_s", "0.1")]].concat();
+        let options = SessionOptions { uncertified: true, ..options() };
+        let session = Session::new(scenario("board_smc_2", &set), options).unwrap();
+        let (_, events) = run(&session, &Arc::default(), f64::INFINITY);
+        let Some(Event::Announced(announcement)) = events.into_iter().next() else {
+            panic!("nothing was announced")
+        };
+        announcement.remarks.join("\n")
+    };
+    let sign = ("law", "{ smc_sign = {} }");
+    assert!(remarks(&[sign]).contains("set safety.limits.saturation_time_s to the duration of the run"));
+    assert!(!remarks(&[sign, ("safety.limits.saturation_time_s", "0.3")]).contains("saturation_time_s"));
+    // 1.745² / (2 · 27.7) rad.
+    let fast = remarks(&[("reference.ramp.rate_deg_s", "100.0")]);
+    assert!(fast.contains("the shaft falls 3.15° behind: more than the 3.00° of"), "{fast}");
+    assert!(!remarks(&[("reference.ramp.rate_deg_s", "90.0")]).contains("behind"));
+}
+
+#[test]
+fn a_bound_as_sampled_is_not_of_a_rig_whose_friction_falls_more_slowly() {
+    let slower = |set: &[(&str, &str)]| {
+        let scenario = scenario("board_smc_2", set);
+        scenario.sampled(&scenario.plan().unwrap().bounds).slower_fall
+    };
+    assert_eq!(slower(&[]), None);
+    let velocity = ("rig.friction.stribeck.stribeck_velocity_rad_s", "0.05");
+    assert!(
+        slower(&[velocity]).is_some_and(|fall| fall.contains("v_s 0.05 rad/s, δ 1, slower than v_s 0.001"))
+    );
+    assert!(slower(&[("rig.friction.stribeck.stribeck_exponent", "0.5")]).is_some());
+    assert_eq!(slower(&[velocity, ("model.friction.stribeck.stribeck_velocity_rad_s", "0.05")]), None);
+    assert_eq!(slower(&[velocity, ("rig.friction.stribeck.mu_static", "0.15")]), None, "there is no fall");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::convert::{core_error, from_json, os_error};
 use crate::scenario::Scenario;
 use crate::stepping::{PythonLaw, event_table, native};
 use crate::table::{Column, Table};
+use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
 use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
@@ -66,7 +67,14 @@ pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<
     let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
     let lacks = rig.lacks_damping(spec.output.highest).map(not_passive);
     let cannot = scenario.0.cannot_follow().map_err(|e| scenario.error(py, &e))?;
-    for note in lacks.into_iter().chain(cannot) {
+    let invalid = run.trace.limit.iter().filter(|limit| **limit == Limit::Invalid).count();
+    let not_a_number = python_law.as_ref().filter(|_| invalid > 0).map(|law| {
+        format!(
+            "{law} answered no finite number in {invalid} of {} periods: the output was output.on_invalid_v there",
+            run.trace.limit.len()
+        )
+    });
+    for note in lacks.into_iter().chain(cannot).chain(not_a_number) {
         let note = CString::new(format!("{}: {note}", scenario.0.name()))?;
         // Of the line that asked for the run, not of the package's own.
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 2)?;

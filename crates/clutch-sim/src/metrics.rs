@@ -382,8 +382,9 @@ impl MetricsBuilder {
             mean_error_rad: s.sum / n,
             iae_rad_s: s.absolute * s.period,
             stick_slip_cycles_per_s: of.sticks as f64 / time,
-            stick_time_fraction: of.stuck_time / time,
-            longest_stick_s: Some(of.longest_stick),
+            // A sum of periods may round to more than all of them.
+            stick_time_fraction: (of.stuck_time / time).min(1.0),
+            longest_stick_s: Some(of.longest_stick.min(time)),
             stair_height_rad: of.stair,
             break_away_torque_nm: (of.break_aways > 0).then(|| of.break_away_sum / of.break_aways as f64),
             control_variation_v_s: s.variation / time,

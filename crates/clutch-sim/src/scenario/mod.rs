@@ -224,21 +224,23 @@ impl Scenario {
         // The path is walked anew unless all keys are ones that it knows nothing of.
         let mut keeps_path = true;
         for (key, value) in set {
-            let row = row_at(&self.params, key)?;
-            let section = key.split('.').next().unwrap_or_default();
-            let plain = matches!(row.kind, Kind::Real | Kind::Whole | Kind::Switch | Kind::Word(_));
-            // A parameter that may be absent decides what else may be there.
-            if !plain || key == "rig.base" || row.optional {
-                return None;
+            let mut found = None;
+            tables::set(&mut scenario.params, key, |row| {
+                let plain = matches!(row.kind, Kind::Real | Kind::Whole | Kind::Switch | Kind::Word(_));
+                // A parameter that may be absent decides what else may be there.
+                if !plain || key == "rig.base" || row.optional {
+                    return None;
+                }
+                let value = checked(&self.origin, key, row, value.clone());
+                found.insert(value).as_ref().ok().cloned()
+            });
+            match found? {
+                Ok(value) => scenario.changes.push((key.clone(), value)),
+                Err(e) => return Some(Err(e)),
             }
+            let section = key.split('.').next().unwrap_or_default();
             keeps_path &= matches!(section, "law" | "velocity" | "safety")
                 || (section == "rig" && !key.starts_with("rig.encoder") && key != "rig.speed_limit_deg_s");
-            let value = match checked(&self.origin, key, row, value.clone()) {
-                Ok(value) => value,
-                Err(e) => return Some(Err(e)),
-            };
-            tables::set(&mut scenario.params, key, &value);
-            scenario.changes.push((key.clone(), value));
         }
         let envelope = self.plan.as_ref().filter(|_| keeps_path).map(|plan| plan.envelope);
         Some(scenario.make(envelope).map(|()| scenario))

@@ -180,6 +180,6 @@ mod tests {
         assert_eq!(schema["properties"]["rig"]["required"], json!(["base"]));
         assert_eq!(schema["properties"]["rig"]["properties"]["ripple"]["required"], Value::Null);
         assert_eq!(schema["properties"]["safety"]["required"], json!(["reason", "on_fault"]));
-        assert_eq!(schema["properties"]["velocity"]["oneOf"][2], json!({ "required": ["observer"] }));
+        assert_eq!(schema["properties"]["velocity"]["oneOf"][3], json!({ "required": ["observer"] }));
     }
 }

@@ -274,7 +274,8 @@ fn in_kind(kind: Kind, value: Value) -> Value {
 /// The value, if it is of the row's kind and in its range.
 pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result<Value, ScenarioError> {
     let expected = || row.range.words(row.kind, &row.unit, false).to_string();
-    let given = shown(&value);
+    let as_given = value.clone();
+    let given = || shown(&as_given);
     let wrong = |given: &str, expected: &str| Err(ScenarioError::value(origin, at, given, expected));
     let number = |x: f64| row.range.holds(&clutch_core::params::NONE, x);
     let value = in_kind(row.kind, value);
@@ -285,15 +286,15 @@ pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result
         (Kind::Word(words), Value::String(word)) if words.iter().any(|w| w.name == word) => Ok(value),
         (Kind::Word(words), Value::String(word)) => {
             let names: Vec<&str> = words.iter().map(|w| w.name).collect();
-            wrong(&given, &format!("{}{}", expected(), nearest(word, &names)))
+            wrong(&given(), &format!("{}{}", expected(), nearest(word, &names)))
         }
         (Kind::Points, Value::Array(points)) => {
             let Some(pairs) = points.iter().map(pair).collect::<Option<Vec<_>>>() else {
-                return wrong(&given, &expected());
+                return wrong(&given(), &expected());
             };
             let pairs = Points(pairs);
             if pairs.0.is_empty() {
-                return wrong(&given, &expected());
+                return wrong(&given(), &expected());
             }
             if let Some(i) = pairs.wrong(&row.range, &row.unit) {
                 let point = pairs.0.get(i).map_or(String::new(), |(a, b)| format!("[{a}, {b}] "));
@@ -302,7 +303,7 @@ pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result
             let array = |(a, b)| Value::Array(vec![Value::Float(a), Value::Float(b)]);
             Ok(Value::Array(pairs.0.into_iter().map(array).collect()))
         }
-        _ => wrong(&given, &expected()),
+        _ => wrong(&given(), &expected()),
     }
 }
 

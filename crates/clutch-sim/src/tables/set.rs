@@ -7,58 +7,63 @@ use toml::Value;
 
 /// The row at a dotted key of what is there, absent parameters included.
 pub(crate) fn row_at<P: Params<f64>>(params: &P, key: &str) -> Option<&'static Row> {
-    let mut at = At { path: Vec::new(), key, value: None, row: None };
-    params.clone().edit(&mut at);
-    at.row
+    let mut row = None;
+    set(&mut params.clone(), key, |found| {
+        row = Some(found);
+        None
+    });
+    row
 }
 
-/// Sets the parameter at a dotted key to a value that is known to be of its kind and in its range.
-pub(crate) fn set<P: Params<f64>>(params: &mut P, key: &str, value: &Value) {
-    params.edit(&mut At { path: Vec::new(), key, value: Some(value), row: None });
+/// Sets the parameter at a dotted key to the value that `give` has for its row, known to be of its kind and in its range; none
+/// leaves it.
+pub(crate) fn set<P: Params<f64>>(
+    params: &mut P,
+    key: &str,
+    give: impl FnMut(&'static Row) -> Option<Value>,
+) {
+    params.edit(&mut At { left: vec![Some(key)], give });
 }
 
-struct At<'a> {
-    path: Vec<&'static str>,
-    key: &'a str,
-    value: Option<&'a Value>,
-    row: Option<&'static Row>,
+struct At<'a, F> {
+    /// The part of the key below each table on the way; none in a table that it does not name.
+    left: Vec<Option<&'a str>>,
+    give: F,
 }
 
-impl<'a> At<'a> {
+impl<F: FnMut(&'static Row) -> Option<Value>> At<'_, F> {
     /// The value, if this is the row.
-    fn here<P: Parameters<f64>>(&mut self, row: usize) -> Option<&'a Value> {
+    fn here<P: Parameters<f64>>(&mut self, row: usize) -> Option<Value> {
+        let key = (*self.left.last()?)?;
         let row = &P::ROWS[row];
-        let mut rest = self.key;
-        for part in &self.path {
-            rest = rest.strip_prefix(part)?.strip_prefix('.')?;
-        }
-        if rest != row.key {
-            return None;
-        }
-        self.row = Some(row);
-        self.value
+        (key == row.key).then(|| (self.give)(row))?
+    }
+
+    fn down(&mut self, table: &str) {
+        let key = self.left.last().copied().flatten();
+        self.left.push(key.and_then(|key| key.strip_prefix(table)?.strip_prefix('.')));
     }
 }
 
-impl Editor<f64> for At<'_> {
+impl<F: FnMut(&'static Row) -> Option<Value>> Editor<f64> for At<'_, F> {
     fn real<P: Parameters<f64>>(&mut self, row: usize, value: &mut f64) {
-        if let Some(x) = self.here::<P>(row).and_then(Value::as_float) {
+        if let Some(x) = self.here::<P>(row).as_ref().and_then(Value::as_float) {
             *value = P::ROWS[row].unit.to_si(x);
         }
     }
     fn whole<P: Parameters<f64>>(&mut self, row: usize, value: &mut u64) {
-        if let Some(n) = self.here::<P>(row).and_then(Value::as_integer) {
+        if let Some(n) = self.here::<P>(row).as_ref().and_then(Value::as_integer) {
             *value = u64::try_from(n).unwrap_or(0);
         }
     }
     fn switch<P: Parameters<f64>>(&mut self, row: usize, value: &mut bool) {
-        if let Some(on) = self.here::<P>(row).and_then(Value::as_bool) {
+        if let Some(on) = self.here::<P>(row).as_ref().and_then(Value::as_bool) {
             *value = on;
         }
     }
     fn word<P: Parameters<f64>>(&mut self, row: usize, value: &mut usize) {
         if let (Some(Value::String(word)), Kind::Word(words)) = (self.here::<P>(row), P::ROWS[row].kind)
-            && let Some(place) = words.iter().position(|w| w.name == word)
+            && let Some(place) = words.iter().position(|w| *w.name == word)
         {
             *value = place;
         }
@@ -75,17 +80,17 @@ impl Editor<f64> for At<'_> {
         self.here::<P>(row).is_some() || present
     }
     fn enter<P: Parameters<f64>>(&mut self, nested: usize, present: bool) -> bool {
-        self.path.push(P::TABLE.nested[nested].key);
+        self.down(P::TABLE.nested[nested].key);
         present
     }
     fn leave<P: Parameters<f64>>(&mut self, _: usize) {
-        self.path.pop();
+        self.left.pop();
     }
     fn choose<C: Choice<f64>>(&mut self, chosen: usize) -> usize {
-        self.path.push(C::CHOICE.options[chosen].key);
+        self.down(C::CHOICE.options[chosen].key);
         chosen
     }
     fn chose<C: Choice<f64>>(&mut self, _: usize) {
-        self.path.pop();
+        self.left.pop();
     }
 }
