@@ -608,7 +608,7 @@ fn the_runs_of_the_motor_that_the_docs_show_are_the_runs_that_come() {
         }
         checked += 1;
     }
-    assert_eq!(checked, 8);
+    assert_eq!(checked, 9);
 }
 
 /// The same page: its file in full, and the figures within its sentences.
@@ -631,9 +631,9 @@ fn the_file_and_the_sentences_of_the_motors_evening_are_what_comes() {
     let sentence = format!("its largest error grows from {known:.3}° to {low:.3}°");
     assert!(words.contains(&sentence), "lacks: {sentence}");
 
-    let proven =
-        ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"].map(|name| told(&["certify", name]));
-    assert_eq!(proven.each_ref().map(|p| p["certified"] == true), [false, false, true, false]);
+    let names = ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"];
+    let proven = names.map(|name| told(&["certify", name]));
+    assert_eq!(proven.each_ref().map(|p| p["certified"] == true), [false, false, true, false, false]);
     let bound = proven[2]["layer"]["error_bound_rad"].as_f64().unwrap().to_degrees();
     let sentence = format!("certified, for an error below {bound:.2}°");
     assert!(words.contains(&sentence), "lacks: {sentence}");
