@@ -1,7 +1,10 @@
 //! Arguments of several verbs: a scenario, and what to change in it.
 
+use crate::output::{paragraph, remark};
 use anyhow::{Context, bail};
 use clap::Args;
+use clutch_core::law::LawParams;
+use clutch_core::params::Choice as _;
 use clutch_identify::RigFile;
 use clutch_sim::{Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
@@ -52,6 +55,21 @@ impl ScenarioArgs {
             return Err(ScenarioError::value(scenario.name(), "rig.actuator", kind.name(), &expected).into());
         }
         Ok(scenario)
+    }
+
+    /// Remarks a map that was given to a law which takes none.
+    pub(crate) fn remark_unused_map(&self, scenario: &Scenario) {
+        let law = scenario.spec().law;
+        if let (Some(file), None) = (&self.map, law.filter()) {
+            let takes = LawParams::<f64>::all().into_iter().filter(|law| law.filter().is_some());
+            let names: Vec<_> = takes.map(|law| law.name()).collect();
+            remark(&paragraph(&format!(
+                "note: law.{} takes no map of the disc, so that {} changes nothing; one that does: {}",
+                law.name(),
+                file.display(),
+                names.join(", ")
+            )));
+        }
     }
 }
 

@@ -158,6 +158,7 @@ impl Loop {
         let (identified, map) = (self.identified.clone(), self.map.clone());
         let args = ScenarioArgs { scenario, set, identified, map };
         let scenario = args.load()?;
+        args.remark_unused_map(&scenario);
         if let Some(log) = &self.log
             && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
         {

@@ -26,8 +26,8 @@ use serde_json::json as value;
 pub(crate) struct Map {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// The key across and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a list; unless given, the law's first
-    /// gain from a quarter to four times its value.
+    /// The key across and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a
+    /// list; unless given, the law's first gain from a quarter to four times its value.
     #[arg(long, value_name = "KEY=VALUES", value_parser = axis)]
     x: Option<Axis>,
     /// The key down and its values; with neither --x nor --y the law's second gain.

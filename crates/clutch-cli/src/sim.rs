@@ -105,6 +105,7 @@ impl Sim {
             new_log(log)?;
         }
         let scenario = self.scenario.load()?;
+        self.scenario.remark_unused_map(&scenario);
         let run = with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;

@@ -1013,6 +1013,10 @@ fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped(
     let o = clutch(&["replay", &second]);
     assert_eq!(o.status.code(), Some(0), "{}{}", out(&o), err(&o));
 
+    let o = clutch(&["sim", "bench_pd_2", "--map", &map]);
+    assert!(err(&o).contains("note: law.pd takes no map of the disc"), "{}", err(&o));
+    let words = err(&o).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.ends_with("changes nothing; one that does: glide"), "{words}");
     let o = clutch(&["sim", "bench_glide_2", "--map", &ride]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("ride.mcap: cannot be read"), "{}", err(&o));
