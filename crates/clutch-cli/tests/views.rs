@@ -85,7 +85,7 @@ fn the_scope_draws_a_loop_and_its_key_stops_it_as_an_operator_does() {
     let (_, after) = drawn.split_once("\u{1b}[?1049l").expect("the first screen again");
     let mut after = after.to_owned();
     until("stopped by", &mut after, &screen);
-    assert!(after.contains("max |error|"), "{after:?}");
+    assert!(after.contains("samples received"), "{after:?}");
 }
 
 /// The head of an answer to a request for a socket, and the bytes behind it.
