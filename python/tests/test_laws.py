@@ -99,7 +99,7 @@ def test_a_sweep_with_an_own_law_gives_each_run_a_fresh_copy():
 
 def test_answers_that_are_no_numbers_are_told():
     def lost(tick):
-        return math.nan if tick.error_rad > 0 else 2.24
+        return math.nan if tick.error > 0 else 2.24
 
     with pytest.warns(UserWarning, match=r"lost answered no finite number in \d+ of 5000 periods: the output was"):
         clutch.simulate("pd_2", law=lost)
