@@ -279,6 +279,8 @@ class Certificate(_Record):
             Number of parts of `μ_d` that were proven.
         reason : str or None
             Why there is no bound.
+        slower_fall : str or None
+            The fall of the rig's friction from rest, if it is slower than the model's, of which a bound speaks.
         spectral_radius : tuple of float or None
             Spectral radius with the weakest, a middle and the strongest brake.
         stable : bool or None
@@ -302,6 +304,7 @@ class Certificate(_Record):
         limiting_friction_sliding: tuple[float, ...] | None
         cells: int | None
         reason: str | None
+        slower_fall: str | None
         spectral_radius: tuple[float, ...] | None
         stable: bool | None
         sticks_excluded: bool

@@ -42,6 +42,8 @@ Range = tuple[float, float] | tuple[float, float, Literal["log", "int"]]
 #: The result of a native job: a table of its finished rows, traces and refusals by row.
 _Result = tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]
 
+#: The column of the verdict in continuous time.
+_CERTIFIED = "certified_continuous_time"
 #: Columns kept with ``traces=True``.
 _TRACES = ("time_s", "error_rad", "voltage_v")
 #: Rows of a chunk for an executor that does not report its number of workers.
@@ -404,7 +406,7 @@ def sweep(
     [55.5, 0.0]
     """
     scenario = as_scenario(base)
-    chosen, drawn = _chosen(parameters, seeds)
+    chosen, each = _chosen(parameters, seeds)
     if progress is not None and not isinstance(progress, bool) and not callable(progress):
         raise TypeError(f"progress = {progress!r}: expected True, False, None or a function")
     if errors not in ("raise", "keep"):
@@ -441,7 +443,7 @@ def sweep(
         table=finished.table(work.metrics),
         metrics=tuple(work.metrics),
         traces=dict(sorted(finished.traces().items())),
-        seeds=drawn,
+        seeds=each,
         interrupted=interrupted,
     )
 
@@ -472,7 +474,7 @@ _OF_SAMPLES = {"detected_least_cycles_per_s", "detected_most_cycles_per_s", "det
 
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
     # Those that a run has of which only figures are kept.
-    known = [*(name for name in FIGURES if name not in _OF_SAMPLES), "certified_continuous_time"]
+    known = [*(name for name in FIGURES if name not in _OF_SAMPLES), _CERTIFIED]
     chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
     unknown = [m for m in chosen if m not in known]
     if unknown:
@@ -579,7 +581,7 @@ class _OwnLaw:
         columns: dict[str, Any] = {"row": np.arange(len(runs), dtype=np.int64)}
         for name in self._work.metrics:
             # A certificate is of the scenario's law, which did not run.
-            kind, none = (bool, False) if name == "certified_continuous_time" else (float, math.nan)
+            kind, none = (bool, False) if name == _CERTIFIED else (float, math.nan)
             values = [getattr(done.metrics, name, none) if isinstance(done, Result) else none for _, done in runs]
             columns[name] = np.asarray([none if value is None else value for value in values], dtype=kind)
         errors = [str(done) if isinstance(done, ParamError) else "" for _, done in runs]
@@ -634,7 +636,7 @@ class _Finished:
             columns[key] = _column([row[i] for row in self.samples.rows])[rows]
         for name in metrics:
             parts = [table[name] for _, table in tables]
-            nothing = np.empty(0, dtype=bool if name == "certified_continuous_time" else float)
+            nothing = np.empty(0, dtype=bool if name == _CERTIFIED else float)
             columns[name] = np.concatenate(parts)[order] if parts else nothing
         columns["error"] = np.asarray([texts[i] for i in order], dtype=object)
         return Table(columns)
@@ -650,8 +652,12 @@ def _column(values: list[Any]) -> Any:
         return np.asarray(values, dtype=np.int64)
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         return np.asarray(values, dtype=np.float64)
-    texts = [v if isinstance(v, str) else json.dumps(v) for v in values]
-    return np.asarray(texts, dtype=object)
+    return np.asarray([_text(v) for v in values], dtype=object)
+
+
+def _text(value: Any) -> str:
+    """A value that is neither number nor text as JSON."""
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def _run_here(work: _Work, finished: _Finished, numbers: list[int], threads: int | None, show: _Progress) -> None:
@@ -923,8 +929,8 @@ class SweepResult:
         """
         if metric not in self.metrics:
             raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
-        if metric == "certified_continuous_time":
-            raise ValueError("certified_continuous_time cannot be minimised; filter by it and rank by another metric")
+        if metric == _CERTIFIED:
+            raise ValueError(f"{_CERTIFIED} cannot be minimised; filter by it and rank by another metric")
         runs, texts = self.table["row"].tolist(), self.table["error"]
         columns = {name: self.table[name].tolist() for name in self.metrics}
         groups: dict[int, list[int]] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import os
 import time
@@ -15,7 +14,7 @@ from typing import Any
 
 from clutch._extras import needed
 from clutch._run import Law, ScenarioLike, as_scenario
-from clutch._sweep import Samples, _chosen, _known_metrics, _Progress, sweep
+from clutch._sweep import _CERTIFIED, Samples, _chosen, _column, _known_metrics, _Progress, _text, sweep
 from clutch._units import attributes
 
 __all__ = ["SweptFile", "sweep_to_file"]
@@ -139,11 +138,10 @@ def sweep_to_file(
         while done < len(chosen) and not interrupted:
             begun = time.monotonic()
             rows = range(done, min(done + size, len(chosen)))
+            # Within its runs a sweep gives those that have ended; before and behind them there are none.
             try:
                 new = run(rows)
-            except (
-                KeyboardInterrupt
-            ):  # before its runs, or behind them: within them the sweep gives those that have ended
+            except KeyboardInterrupt:
                 new = []
             interrupted = len(new) < len(rows)
             refused += sum(_is_refused(line) for line in new)
@@ -166,13 +164,11 @@ def _is_refused(line: bytes) -> bool:
 
 def _cell(value: Any) -> str:
     """A value as the file has it: numbers so that reading gives the same bits, nothing where there is none."""
-    if isinstance(value, str):
-        return " ".join(value.splitlines())
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, float):
+    if isinstance(value, int | float):
         return "" if math.isnan(value) else repr(value)
-    return str(value) if isinstance(value, int) else json.dumps(value, sort_keys=True)
+    return " ".join(_text(value).splitlines())
 
 
 def _joined(cells: Iterable[str]) -> bytes:
@@ -248,18 +244,11 @@ def _to_parquet(lines: Path, out: Path, chosen: Samples, metrics: Sequence[str])
     from pyarrow import csv as reader
     from pyarrow import parquet
 
-    kinds = {name: pyarrow.float64() for name in metrics} | {"error": pyarrow.string()}
-    if "certified_continuous_time" in kinds:
-        kinds["certified_continuous_time"] = pyarrow.bool_()
+    kinds = {name: pyarrow.bool_() if name == _CERTIFIED else pyarrow.float64() for name in metrics}
+    kinds["error"] = pyarrow.string()
     for i, key in enumerate(chosen.keys):
-        values = [row[i] for row in chosen.rows]
-        if all(isinstance(value, bool) for value in values):
-            kinds[key] = pyarrow.bool_()
-        elif all(isinstance(value, int) for value in values):
-            kinds[key] = pyarrow.int64()
-        else:
-            numbers = all(isinstance(value, int | float) for value in values)
-            kinds[key] = pyarrow.float64() if numbers else pyarrow.string()
+        of = _column([row[i] for row in chosen.rows]).dtype
+        kinds[key] = pyarrow.string() if of.kind == "O" else pyarrow.from_numpy_dtype(of)
     names = [*chosen.keys, *metrics, "error"]
     schema = pyarrow.schema([pyarrow.field(name, kinds[name], metadata=attributes(name)) for name in names])
     options = reader.ConvertOptions(column_types=kinds, strings_can_be_null=False)

@@ -115,7 +115,8 @@ pub(crate) fn json(sampled: &Sampled, bound: &Bound) -> Value {
         "any_law": sampled.any_law(),
         "cells": proven.map(|p| p.cells),
         "reason": bound.reason(),
-        "spectral_radius": sampled.stability.map(|radii| radii.map(|s| s.radius)),
+        "slower_fall": sampled.slower_fall,
+        "spectral_radius": sampled.radii(),
         "stable": sampled.stable(),
         "sticks_excluded": false,
     })

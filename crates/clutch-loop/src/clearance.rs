@@ -1,7 +1,9 @@
 //! May a scenario run on a board?
 
-use clutch_sim::scenario::{CertificateError, Plan, Proven, STICKS, Sampled};
-use clutch_sim::{Scenario, ScenarioError, Start};
+use clutch_core::ActuatorKind;
+use clutch_core::reference::ReferenceParams;
+use clutch_sim::scenario::{CERTIFIED, CertificateError, Plan, Proven, STICKS, Sampled};
+use clutch_sim::{Scenario, ScenarioError, Start, number};
 use std::path::{Path, PathBuf};
 
 /// A scenario may not run on a board, or not with these gains.
@@ -79,12 +81,43 @@ impl Cleared {
     #[must_use]
     pub fn verdicts(&self) -> [(String, String); 4] {
         [
-            ("certified_continuous_time", self.plan.certificate.certified().to_string()),
+            (CERTIFIED, self.plan.certificate.certified().to_string()),
             ("as_sampled", self.bound_line()),
             ("linear_stability", self.sampled.stability_line()),
             ("sticks", STICKS.to_owned()),
         ]
         .map(|(name, verdict)| (name.to_owned(), verdict))
+    }
+
+    /// Remarks on limits of the supervisor that a sound shaft will meet with this law and path.
+    #[must_use]
+    pub fn limits_met(&self, scenario: &Scenario) -> Vec<String> {
+        let plan = &self.plan;
+        let (spec, mut remarks) = (scenario.spec(), Vec::new());
+        let Ok(limits) = scenario.safety().map(|safety| &safety.limits.supervisor) else { return remarks };
+        let switches = plan.certificate.certified() && plan.certificate.layer <= 0.0;
+        if switches && limits.saturation_time < spec.run.duration {
+            remarks.push(format!(
+                "note: this law is at a limit of its output in every period, which ends a run after {} s: set \
+                 safety.limits.saturation_time_s to the duration of the run",
+                number(limits.saturation_time)
+            ));
+        }
+        // A ramp is at its rate at once; a shaft at rest falls behind it until it is as fast.
+        let (rate, pull) = (plan.envelope.velocity, plan.bounds.drive_torque.low / plan.bounds.inertia.high);
+        let at_once = matches!(spec.reference, ReferenceParams::Ramp(_)) && spec.run.start == Start::Rest;
+        let behind = 0.5 * rate * rate / pull;
+        let allowed = limits.following_error + limits.following_time * rate;
+        if at_once && plan.bounds.actuator == ActuatorKind::Brake && pull > 0.0 && behind > allowed {
+            remarks.push(format!(
+                "note: from rest the drive takes {} s to the ramp's rate, in which the shaft falls {:.2}° behind: more than the \
+                 {:.2}° of safety.limits.following_error_deg and following_time_s, which end the run",
+                number(rate / pull),
+                behind.to_degrees(),
+                allowed.to_degrees()
+            ));
+        }
+        remarks
     }
 }
 

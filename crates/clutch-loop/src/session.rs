@@ -23,20 +23,19 @@ use crate::release::{self, NoRelease, ReleaseTest};
 use crate::sim_board::PATIENT_BOARD;
 use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
-use crate::summary::{LogSummary, SampledSummary, Summary};
+use crate::summary::{LogSummary, Summary};
 use crate::to_log::PRESENT_CODE;
 use crate::tuning::Tuning;
 use crate::watch::Watch;
 use clutch_core::law::Law;
-use clutch_core::reference::ReferenceParams;
 use clutch_core::supervisor::Cause;
 use clutch_core::{
     ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo,
 };
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
-use clutch_sim::scenario::{Plan, ScalarKind};
-use clutch_sim::{Scenario, ScenarioError, Start, number};
+use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{Scenario, ScenarioError, number};
 use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -354,8 +353,8 @@ impl Session {
         Ok(Summary {
             scenario: self.scenario.name().to_owned(),
             version: self.options.version.clone(),
-            certified: self.certified(),
-            sampled: SampledSummary::new(&self.cleared, self.options.certificate.as_deref()),
+            cleared: self.cleared.clone(),
+            certificate: self.options.certificate.clone(),
             stopped: stop.load(Ordering::Relaxed),
             faults,
             report,
@@ -670,7 +669,7 @@ impl Course<'_> {
             let does = if plan.bounds.actuator == ActuatorKind::Motor { "drives" } else { "does not hold" };
             remarks.push(format!("note: the board powers up at a voltage that {does} the shaft; set its power-up output to the safe state's"));
         }
-        remarks.extend(limits_met(scenario, plan));
+        remarks.extend(cleared.limits_met(scenario));
         if is_simulated(hello)
             && let Some(reason) = scenario.cannot_follow()?
         {
@@ -809,32 +808,4 @@ fn host<'a>(
 /// True for a device, of which nobody knows how it is wired.
 fn is_real(port: &Port) -> bool {
     port.kind() != DeviceKind::PseudoTerminal && !port.kind().is_socket()
-}
-/// Remarks on limits of the supervisor that a sound shaft will meet with this law and path.
-fn limits_met(scenario: &Scenario, plan: &Plan) -> Vec<String> {
-    let (spec, mut remarks) = (scenario.spec(), Vec::new());
-    let Ok(limits) = scenario.safety().map(|safety| &safety.limits.supervisor) else { return remarks };
-    let switches = plan.certificate.certified() && plan.certificate.layer <= 0.0;
-    if switches && limits.saturation_time < spec.run.duration {
-        remarks.push(format!(
-            "note: this law is at a limit of its output in every period, which ends a run after {} s: set \
-             safety.limits.saturation_time_s to the duration of the run",
-            number(limits.saturation_time)
-        ));
-    }
-    // A ramp is at its rate at once; a shaft at rest falls behind it until it is as fast.
-    let (rate, pull) = (plan.envelope.velocity, plan.bounds.drive_torque.low / plan.bounds.inertia.high);
-    let at_once = matches!(spec.reference, ReferenceParams::Ramp(_)) && spec.run.start == Start::Rest;
-    let behind = 0.5 * rate * rate / pull;
-    let allowed = limits.following_error + limits.following_time * rate;
-    if at_once && plan.bounds.actuator == ActuatorKind::Brake && pull > 0.0 && behind > allowed {
-        remarks.push(format!(
-            "note: from rest the drive takes {} s to the ramp's rate, in which the shaft falls {:.2}° behind: more than the \
-             {:.2}° of safety.limits.following_error_deg and following_time_s, which end the run",
-            number(rate / pull),
-            behind.to_degrees(),
-            allowed.to_degrees()
-        ));
-    }
-    remarks
 }

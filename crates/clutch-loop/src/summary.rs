@@ -7,9 +7,9 @@ use crate::realtime::CycleSummary;
 use crate::sim_board_server::ServeReport;
 use clutch_core::supervisor::{Cause, State};
 use clutch_sim::number;
-use clutch_sim::scenario::STICKS;
+use clutch_sim::scenario::{CERTIFIED, STICKS};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The verdict on the end of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,38 +37,6 @@ impl Verdict {
     }
 }
 
-/// The verdicts on the sampled loop.
-#[derive(Clone, Debug)]
-pub struct SampledSummary {
-    /// Bound on `|e|`, if a certificate was given, rad.
-    pub error_bound: Option<f64>,
-    /// The verdict in words, with its scope.
-    pub verdict: String,
-    /// The certificate's file.
-    pub certificate: Option<PathBuf>,
-    /// Spectral radii with the weakest, a middle and the strongest actuator, if they are known.
-    pub spectral_radius: Option<[f64; 3]>,
-    /// True if small deviations die out, if that is known.
-    pub stable: Option<bool>,
-    /// The verdict on linear stability in words.
-    pub stability: String,
-}
-
-impl SampledSummary {
-    /// The verdict of what was checked before the run.
-    #[must_use]
-    pub fn new(cleared: &Cleared, certificate: Option<&Path>) -> Self {
-        SampledSummary {
-            error_bound: cleared.proven.as_ref().map(|proven| proven.checked.error_bound),
-            verdict: cleared.bound_line(),
-            certificate: certificate.map(Path::to_owned),
-            spectral_radius: cleared.sampled.stability.map(|radii| radii.map(|s| s.radius)),
-            stable: cleared.sampled.stable(),
-            stability: cleared.sampled.stability_line(),
-        }
-    }
-}
-
 /// The fate of a session's log.
 #[derive(Clone, Debug)]
 pub struct LogSummary {
@@ -85,10 +53,10 @@ pub struct Summary {
     pub scenario: String,
     /// Version and commit of the build.
     pub version: String,
-    /// True if the gains are certified, in continuous time, for the scenario's bounds.
-    pub certified: bool,
-    /// The verdicts on the sampled loop.
-    pub sampled: SampledSummary,
+    /// What is known of the gains.
+    pub cleared: Cleared,
+    /// The file of the sampled loop's certificate, if one was given.
+    pub certificate: Option<PathBuf>,
     /// True if somebody here has stopped it.
     pub stopped: bool,
     /// Faults that were asked for.
@@ -134,8 +102,8 @@ impl Summary {
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
         let mut lines = vec![
-            format!("as sampled: {}", self.sampled.verdict),
-            format!("as sampled: {}", self.sampled.stability),
+            format!("as sampled: {}", self.cleared.bound_line()),
+            format!("as sampled: {}", self.cleared.sampled.stability_line()),
             format!("sticks: {STICKS}"),
         ];
         lines.push(format!("{}: {}", r.drift.label(), r.drift.words()));
@@ -238,13 +206,13 @@ impl Summary {
             "cause": format!("{:?}", r.cause),
             "cause_text": self.cause_text(),
             "value": r.value,
-            "certified_continuous_time": self.certified,
+            (CERTIFIED): self.cleared.plan.certificate.certified(),
             "sampled": {
-                "error_bound_rad": self.sampled.error_bound,
-                "verdict": self.sampled.verdict,
-                "certificate": self.sampled.certificate,
-                "spectral_radius": self.sampled.spectral_radius,
-                "stable": self.sampled.stable,
+                "error_bound_rad": self.cleared.proven.map(|proven| proven.checked.error_bound),
+                "verdict": self.cleared.bound_line(),
+                "certificate": self.certificate,
+                "spectral_radius": self.cleared.sampled.radii(),
+                "stable": self.cleared.sampled.stable(),
                 "sticks_excluded": false,
             },
             "ticks": r.ticks,

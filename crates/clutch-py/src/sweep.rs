@@ -4,6 +4,7 @@ use crate::convert::{scenario_error, to_table, to_toml};
 use crate::run::sample_columns;
 use crate::table::{Column, Table};
 use clutch_sim::metrics::figure_columns;
+use clutch_sim::scenario::CERTIFIED;
 use clutch_sim::{Keep, ScenarioError, sweep};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -83,9 +84,8 @@ impl Sweep {
         let known: Vec<&str> =
             figure_columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
         for name in &metrics {
-            if name != "certified_continuous_time" && !known.contains(&name.as_str()) {
-                let text =
-                    format!("metrics: \"{name}\": expected certified_continuous_time, {}", known.join(", "));
+            if name != CERTIFIED && !known.contains(&name.as_str()) {
+                let text = format!("metrics: \"{name}\": expected {CERTIFIED}, {}", known.join(", "));
                 return Err(PyValueError::new_err(text));
             }
         }
@@ -199,7 +199,7 @@ impl Sweep {
             columns.push(("row".to_owned(), Column::own(row)));
             for (m, name) in self.metrics.iter().enumerate() {
                 let values = rows.values().map(|r| r.metrics[m]);
-                let column = if name == "certified_continuous_time" {
+                let column = if name == CERTIFIED {
                     Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
                 } else {
                     Column::own(values.collect::<Vec<f64>>())
@@ -233,11 +233,7 @@ fn row(
             let value = |name: &String| {
                 let found =
                     figure_columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
-                if name == "certified_continuous_time" {
-                    f64::from(u8::from(certified))
-                } else {
-                    found.unwrap_or(f64::NAN)
-                }
+                if name == CERTIFIED { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
             };
             let metrics = metrics.iter().map(value).collect();
             let trace = (!traces.is_empty()).then(|| {
@@ -249,7 +245,7 @@ fn row(
             Row { metrics, error: None, trace }
         }
         Err(e) => {
-            let nothing = |name: &String| if name == "certified_continuous_time" { 0.0 } else { f64::NAN };
+            let nothing = |name: &String| if name == CERTIFIED { 0.0 } else { f64::NAN };
             Row { metrics: metrics.iter().map(nothing).collect(), error: Some(e), trace: None }
         }
     }

@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use arrow_schema::{DataType, Field};
 use clutch_sim::Scenario;
 use clutch_sim::metrics::{Detected, Metrics};
-use clutch_sim::scenario::Value;
+use clutch_sim::scenario::{CERTIFIED, Value};
 use std::path::Path;
 
 /// Values of a column, as they are read.
@@ -98,7 +98,7 @@ impl Grid {
                 about.iter().find(|(figure, _)| *figure == name).map_or(("", ""), |(_, about)| *about);
             add(name, Cells::Real(Vec::new()), about);
         }
-        add("certified_continuous_time", Cells::Flag(Vec::new()), ("", ""));
+        add(CERTIFIED, Cells::Flag(Vec::new()), ("", ""));
         add("error", Cells::Text(Vec::new()), ("", ""));
         columns
     }

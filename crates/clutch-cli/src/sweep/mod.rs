@@ -12,7 +12,7 @@ use clap::Args;
 use clutch_sim::Keep;
 use clutch_sim::metrics::{Detected, Metrics, figure_columns};
 use clutch_sim::progress::{Progress, Report};
-use clutch_sim::scenario::{Table, Value, written_value};
+use clutch_sim::scenario::{CERTIFIED, Table, Value, written_value};
 use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Scenario, ScenarioError};
 use std::fs::{File, OpenOptions};
@@ -191,7 +191,7 @@ impl Grid {
         let keys = self.axes.iter().map(|axis| axis.key.clone());
         let figures = figures(&Metrics::default(), &Detected::default());
         keys.chain(figures.into_iter().map(|(name, _)| name.to_owned()))
-            .chain(["certified_continuous_time".into(), "error".into()])
+            .chain([CERTIFIED.into(), "error".into()])
             .collect()
     }
 

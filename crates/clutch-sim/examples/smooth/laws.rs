@@ -19,24 +19,30 @@ pub(super) struct Law {
 /// The law glide.
 pub(super) const GLIDE: &str = LAWS[0].scenario;
 
+/// PI with feed-forward, and the source of its velocity.
+macro_rules! pi {
+    ($velocity:literal) => {
+        concat!(
+            "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n",
+            $velocity
+        )
+    };
+}
+
 /// Every law; glide first.
 pub(super) const LAWS: &[Law] = &[
     Law { title: "glide", short: "glide", scenario: "[law.glide.filter]\ndelay_ticks = 1" },
     Law {
         title: "PI with feed-forward, (5)",
         short: "PI, (5)",
-        scenario: "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67",
+        scenario: pi!("[velocity.smoothed_derivative]\nsmoothing = 0.67"),
     },
     Law {
         title: "the same, edge-timed",
         short: "PI, edges",
-        scenario: "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.edge_timed]\ndelay_ticks = 1",
+        scenario: pi!("[velocity.edge_timed]\ndelay_ticks = 1"),
     },
-    Law {
-        title: "the same, M/T",
-        short: "PI, M/T",
-        scenario: "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.counts_over_time]",
-    },
+    Law { title: "the same, M/T", short: "PI, M/T", scenario: pi!("[velocity.counts_over_time]") },
     Law {
         title: "PD 1660/12.9, (5)",
         short: "PD, (5)",

@@ -17,7 +17,7 @@ pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioPar
 pub use sampled::{NOISE_ROOTS, NotCovered};
 pub use schema::schema;
 pub use section::check_section;
-pub use verdict::{CertificateError, Proven, STICKS, Sampled, Unproven};
+pub use verdict::{CERTIFIED, CertificateError, Proven, STICKS, Sampled, Unproven};
 pub use written::written_value;
 
 use crate::friction_map::MapGrid;

@@ -9,6 +9,8 @@ use clutch_certificate::{Certificate, Gains, Options, Setup, Stability, largest,
 use clutch_core::Bounds;
 use std::path::Path;
 
+/// The name of the verdict in continuous time: a column of a sweep, a field of a loop's summary, an entry of its log.
+pub const CERTIFIED: &str = "certified_continuous_time";
 /// The verdict on sticks.
 pub const STICKS: &str = "not excluded, neither by a bound nor by stability";
 
@@ -106,6 +108,12 @@ impl Sampled {
     #[must_use]
     pub fn stable(&self) -> Option<bool> {
         self.radius().map(|radius| radius < 1.0)
+    }
+
+    /// Spectral radii with the weakest, a middle and the strongest actuator, if they are known.
+    #[must_use]
+    pub fn radii(&self) -> Option<[f64; 3]> {
+        self.stability.map(|radii| radii.map(|s| s.radius))
     }
 
     /// The largest of the spectral radii, if they are known.
