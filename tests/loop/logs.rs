@@ -236,6 +236,10 @@ fn summary_and_log_tell_how_late_wake_ups_were() {
 fn a_scenario_without_end_is_refused() {
     let _guard = beside_others();
     let _ = run(&["sim", "/dev/zero"]).expect(1).says(&["/dev/zero", "more than 16 MiB"]);
+    for option in ["--map", "--identified"] {
+        let refused = run(&["sim", "bench_glide_2", option, "/dev/zero"]).expect(1);
+        let _ = refused.says(&["/dev/zero: cannot be read", "more than 16 MiB"]);
+    }
 }
 
 /// The checks of every run with a log that was cut short.

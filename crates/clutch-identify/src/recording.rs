@@ -241,7 +241,7 @@ impl Recording {
             ticks,
         };
         found.unwrap_counts();
-        let most = i64::from(counts_per_rev / 2);
+        let most = i64::from(counts_per_rev / 2).max(1);
         let leap = found.ticks.windows(2).position(|w| (w[1].counts - w[0].counts).abs() > most);
         match leap {
             Some(i) => {

@@ -164,9 +164,17 @@ fn tables_of_others_are_read_and_their_mistakes_named() {
         ("n,u\n0,4.5\n1,high\n", "t.csv: line 3, column \"u\" = \"high\": expected a number"),
         ("n,u\n0,inf\n", "t.csv: line 2, column \"u\" = \"inf\": expected a number"),
         ("n,u\n0,4.5\n", "t.csv: has no samples under control"),
+        (
+            "n,u\n0,4.5\n1,4.5\n-20000,4.5\n2,4.5\n",
+            "t.csv: line 4: counts go on by -20001 in one period: expected at most half a turn, 10000",
+        ),
     ] {
         assert_eq!(read(text).unwrap_err().to_string(), said);
     }
+    // A counter of 32 bits that wraps goes on; a weight that turns the shaft backwards turns the recording.
+    let counts = |text: &str| read(text).unwrap().ticks.iter().map(|t| t.counts).collect::<Vec<_>>();
+    assert_eq!(counts("n,u\n2147483647,4.5\n-2147483648,4.5\n"), [2_147_483_647, 2_147_483_648]);
+    assert_eq!(counts("n,u\n0,4.5\n-1,4.5\n-3,4.5\n"), [-1, 0, 2]);
 }
 
 #[test]
