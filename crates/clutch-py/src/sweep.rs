@@ -15,6 +15,25 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+/// A figure that was asked for.
+#[derive(Clone, Copy)]
+enum Asked {
+    Certified,
+    /// Its place among all figures.
+    Figure(usize),
+}
+
+impl Asked {
+    /// The figure of that name; none if there is none.
+    fn named(name: &str) -> Option<Asked> {
+        if name == CERTIFIED {
+            return Some(Asked::Certified);
+        }
+        let place = figure_columns(&Default::default(), &Default::default()).position(|(n, _)| n == name);
+        place.map(Asked::Figure)
+    }
+}
+
 /// The result of a row.
 struct Row {
     metrics: Vec<f64>,
@@ -54,7 +73,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[pyclass(frozen, module = "clutch._clutch")]
 pub(crate) struct Sweep {
     sweep: Arc<sweep::Sweep>,
-    metrics: Vec<String>,
+    metrics: Vec<(String, Asked)>,
     traces: Vec<String>,
     every: usize,
     threads: usize,
@@ -81,14 +100,16 @@ impl Sweep {
             .iter()
             .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
             .collect::<PyResult<Vec<_>>>()?;
-        let known: Vec<&str> =
-            figure_columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
-        for name in &metrics {
-            if name != CERTIFIED && !known.contains(&name.as_str()) {
+        let metrics = metrics.into_iter().map(|name| match Asked::named(&name) {
+            Some(asked) => Ok((name, asked)),
+            None => {
+                let known: Vec<&str> =
+                    figure_columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
                 let text = format!("metrics: \"{name}\": expected {CERTIFIED}, {}", known.join(", "));
-                return Err(PyValueError::new_err(text));
+                Err(PyValueError::new_err(text))
             }
-        }
+        });
+        let metrics = metrics.collect::<PyResult<_>>()?;
         if every == 0 {
             return Err(PyValueError::new_err("every = 0: expected at least 1 sample"));
         }
@@ -122,7 +143,8 @@ impl Sweep {
             return Err(PyRuntimeError::new_err("the sweep has been started already"));
         }
         let (sweep, shared) = (self.sweep.clone(), self.shared.clone());
-        let (metrics, traces, every) = (self.metrics.clone(), self.traces.clone(), self.every);
+        let metrics: Vec<Asked> = self.metrics.iter().map(|(_, asked)| *asked).collect();
+        let (traces, every) = (self.traces.clone(), self.every);
         let threads = self.threads;
         let keep = if traces.is_empty() { Keep::Figures } else { Keep::Trace };
         let work = move || {
@@ -197,12 +219,11 @@ impl Sweep {
             let mut rows = locked(&self.shared.rows);
             let row: Vec<i64> = rows.keys().map(|i| *i as i64).collect();
             columns.push(("row".to_owned(), Column::own(row)));
-            for (m, name) in self.metrics.iter().enumerate() {
+            for (m, (name, asked)) in self.metrics.iter().enumerate() {
                 let values = rows.values().map(|r| r.metrics[m]);
-                let column = if name == CERTIFIED {
-                    Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
-                } else {
-                    Column::own(values.collect::<Vec<f64>>())
+                let column = match asked {
+                    Asked::Certified => Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>()),
+                    Asked::Figure(_) => Column::own(values.collect::<Vec<f64>>()),
                 };
                 columns.push((name.clone(), column));
             }
@@ -224,16 +245,18 @@ impl Sweep {
 
 fn row(
     outcome: Result<sweep::Row, ScenarioError>,
-    metrics: &[String],
+    metrics: &[Asked],
     traces: &[String],
     every: usize,
 ) -> Row {
     match outcome {
         Ok(sweep::Row { certified, run }) => {
-            let value = |name: &String| {
-                let found =
-                    figure_columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
-                if name == CERTIFIED { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
+            let value = |asked: &Asked| match asked {
+                Asked::Certified => f64::from(u8::from(certified)),
+                Asked::Figure(place) => {
+                    let figure = figure_columns(&run.metrics, &run.detected).nth(*place);
+                    figure.and_then(|(_, x)| x).unwrap_or(f64::NAN)
+                }
             };
             let metrics = metrics.iter().map(value).collect();
             let trace = (!traces.is_empty()).then(|| {
@@ -245,7 +268,10 @@ fn row(
             Row { metrics, error: None, trace }
         }
         Err(e) => {
-            let nothing = |name: &String| if name == CERTIFIED { 0.0 } else { f64::NAN };
+            let nothing = |asked: &Asked| match asked {
+                Asked::Certified => 0.0,
+                Asked::Figure(_) => f64::NAN,
+            };
             Row { metrics: metrics.iter().map(nothing).collect(), error: Some(e), trace: None }
         }
     }

@@ -6,7 +6,7 @@
 use crate::lanes;
 use crate::progress::UNWATCHED;
 use crate::run::{Keep, Run};
-use crate::scenario::{ScalarKind, Scenario};
+use crate::scenario::{ScalarKind, Scenario, Setter};
 use crate::scenario_error::ScenarioError;
 use fearless_simd::Level;
 use std::ops::ControlFlow;
@@ -26,8 +26,17 @@ pub struct Sweep {
     base: Table,
     keys: Vec<String>,
     rows: Vec<Vec<Value>>,
-    /// A scenario of which every row is a variation; none if the row that was tried first is refused.
-    shared: OnceLock<Option<Scenario>>,
+    /// None if the row that was tried first is refused, or a key changes more than a value.
+    shared: OnceLock<Option<Shared>>,
+}
+
+/// What all rows have in common.
+#[derive(Clone, Debug)]
+struct Shared {
+    /// A scenario of which every row is a variation.
+    scenario: Scenario,
+    /// The keys of the sweep in it.
+    setters: Vec<Setter>,
 }
 
 /// A row that ran.
@@ -83,17 +92,22 @@ impl Sweep {
     /// # Panics
     /// There is no such row.
     pub fn scenario(&self, row: usize) -> Result<Scenario, ScenarioError> {
-        let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
         // The first row decides what the keys are, and makes what all rows share.
-        let shared = self.shared.get_or_init(|| self.on_base(&set).ok());
-        match shared.as_ref().and_then(|scenario| scenario.with(&set)) {
-            Some(outcome) => outcome,
-            None => self.on_base(&set),
+        match self.shared.get_or_init(|| self.share(row)) {
+            Some(shared) => shared.scenario.with(shared.setters.iter().zip(&self.rows[row])),
+            None => self.on_base(row),
         }
     }
 
-    fn on_base(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
-        Scenario::from_table(&self.origin, self.base.clone(), set)
+    fn on_base(&self, row: usize) -> Result<Scenario, ScenarioError> {
+        let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
+        Scenario::from_table(&self.origin, self.base.clone(), &set)
+    }
+
+    fn share(&self, row: usize) -> Option<Shared> {
+        let scenario = self.on_base(row).ok()?;
+        let setters = self.keys.iter().map(|key| scenario.setter(key)).collect::<Option<_>>()?;
+        Some(Shared { scenario, setters })
     }
 
     /// Runs all rows on so many threads. `done` is called from these, with each finished row,
@@ -136,26 +150,22 @@ impl Sweep {
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
         let stopped = || stop.load(Ordering::Relaxed);
-        let mut planned = Vec::new();
+        let mut planned = Vec::with_capacity(BATCH);
         for i in rows {
             if stopped() {
                 return;
             }
-            let row = self.scenario(i).and_then(|scenario| {
-                let certified = scenario.plan()?.certificate.certified();
-                Ok((i, certified, scenario))
-            });
-            match row {
-                Ok(row) => planned.push(row),
+            match self.scenario(i) {
+                Ok(scenario) => planned.push((i, scenario.certified(), scenario)),
                 Err(e) => done(i, Err(e)),
             }
         }
         let mut told = vec![false; planned.len()];
         if keep == Keep::Figures {
             let doubles = planned.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
-            let specs: Vec<_> = doubles.map(|(place, row)| (place, row.2.spec())).collect();
+            let specs = doubles.map(|(place, row)| (place, row.2.spec()));
             let goes_on =
-                lanes::run_all(Level::new(), &specs, &stopped, &mut |place, engine, metrics, detected| {
+                lanes::run_all(Level::new(), specs, &stopped, &mut |place, engine, metrics, detected| {
                     let (i, certified, _) = &planned[place];
                     told[place] = true;
                     done(

@@ -1,12 +1,12 @@
 //! The rows of a sweep as Parquet, made of the CSV to which they were written as they came.
 
-use super::{Grid, Over, figures};
+use super::{Grid, Over};
 use crate::columnar::{Column, Columnar, TOGETHER, field};
 use crate::output::BUILD;
 use anyhow::{Context, anyhow};
 use arrow_schema::{DataType, Field};
 use clutch_sim::Scenario;
-use clutch_sim::metrics::{Detected, Metrics};
+use clutch_sim::metrics::{Detected, Metrics, figure_columns};
 use clutch_sim::scenario::{CERTIFIED, Value};
 use std::path::Path;
 
@@ -93,7 +93,7 @@ impl Grid {
         let of_motion = Metrics::FIGURES.iter().map(|f| (f.name, (f.unit, f.label)));
         let about: Vec<_> =
             of_motion.chain(Detected::FIGURES.iter().map(|f| (f.name, (f.unit, f.label)))).collect();
-        for (name, _) in figures(&Metrics::default(), &Detected::default()) {
+        for (name, _) in figure_columns(&Metrics::default(), &Detected::default()) {
             let about =
                 about.iter().find(|(figure, _)| *figure == name).map_or(("", ""), |(_, about)| *about);
             add(name, Cells::Real(Vec::new()), about);

@@ -15,6 +15,8 @@ use clutch_sim::progress::{Progress, Report};
 use clutch_sim::scenario::{CERTIFIED, Table, Value, written_value};
 use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Scenario, ScenarioError};
+use std::borrow::Cow;
+use std::fmt::{Display, Write as _};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::num::NonZeroUsize;
@@ -76,9 +78,23 @@ struct Over {
 
 #[derive(Clone, Debug)]
 enum Values {
-    Listed(Vec<Value>),
+    Listed(Vec<Listed>),
     /// 1 to n.
     Seeds(u64),
+}
+
+/// A value, and its text in the file.
+#[derive(Clone, Debug)]
+struct Listed {
+    value: Value,
+    text: String,
+}
+
+impl From<Value> for Listed {
+    fn from(value: Value) -> Self {
+        let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        Listed { value, text }
+    }
 }
 
 impl Values {
@@ -91,8 +107,15 @@ impl Values {
 
     fn at(&self, i: u64) -> Value {
         match self {
-            Values::Listed(list) => list[i as usize].clone(),
+            Values::Listed(list) => list[i as usize].value.clone(),
             Values::Seeds(_) => Value::Integer(i as i64 + 1),
+        }
+    }
+
+    fn text(&self, i: u64) -> Cow<'_, str> {
+        match self {
+            Values::Listed(list) => Cow::Borrowed(&list[i as usize].text),
+            Values::Seeds(_) => Cow::Owned((i + 1).to_string()),
         }
     }
 
@@ -100,7 +123,7 @@ impl Values {
     #[cfg(feature = "parquet")]
     fn all(&self, is: fn(&Value) -> bool) -> bool {
         match self {
-            Values::Listed(list) => list.iter().all(is),
+            Values::Listed(list) => list.iter().all(|listed| is(&listed.value)),
             Values::Seeds(_) => is(&self.at(0)),
         }
     }
@@ -108,12 +131,13 @@ impl Values {
 
 fn over(text: &str) -> Result<Over, String> {
     let (key, list) = text.split_once('=').ok_or("expected KEY=VALUES, as law.pd.kp_v_rad=500:5000:50")?;
-    let values = if list.contains(':') && !list.contains(['{', '[', '"']) {
+    let values: Vec<Value> = if list.contains(':') && !list.contains(['{', '[', '"']) {
         map::values(list)?.0.into_iter().map(Value::Float).collect()
     } else {
         items(list).into_iter().map(|item| value(item.trim())).collect::<Result<_, _>>()?
     };
-    Ok(Over { key: key.trim().to_owned(), values: Values::Listed(values) })
+    let values = Values::Listed(values.into_iter().map(Listed::from).collect());
+    Ok(Over { key: key.trim().to_owned(), values })
 }
 
 /// The parts of a list between commas that stand in no table, array or text.
@@ -169,42 +193,36 @@ impl Grid {
         }
     }
 
-    /// The values of a row, the last key the fastest.
-    fn values(&self, row: u64) -> Vec<Value> {
-        let mut left = row;
-        let mut values: Vec<Value> = self
-            .axes
-            .iter()
-            .rev()
-            .map(|axis| {
-                let n = axis.values.len();
-                let value = axis.values.at(left % n);
-                left /= n;
-                value
-            })
-            .collect();
-        values.reverse();
-        values
+    /// The values of each key, and the place of a row's among them; of the keys the last runs fastest.
+    fn places(&self, row: u64) -> impl Iterator<Item = (&Values, u64)> {
+        let mut rows = self.rows;
+        self.axes.iter().map(move |axis| {
+            let n = axis.values.len();
+            rows /= n;
+            (&axis.values, row / rows % n)
+        })
     }
 
-    fn header(&self) -> Vec<String> {
-        let keys = self.axes.iter().map(|axis| axis.key.clone());
-        let figures = figures(&Metrics::default(), &Detected::default());
-        keys.chain(figures.into_iter().map(|(name, _)| name.to_owned()))
-            .chain([CERTIFIED.into(), "error".into()])
-            .collect()
+    fn header(&self) -> anyhow::Result<Vec<u8>> {
+        let mut line = Line::new();
+        self.axes.iter().try_for_each(|axis| line.cell(&axis.key))?;
+        figure_columns(&Metrics::default(), &Detected::default())
+            .try_for_each(|(name, _)| line.cell(name))?;
+        line.cell(CERTIFIED)?;
+        line.cell("error")?;
+        line.end()
     }
 
     /// The values of a row as the file has them.
-    fn keys_of(&self, row: u64) -> Vec<String> {
-        let plain = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        self.values(row).into_iter().map(plain).collect()
+    fn keys_of(&self, row: u64) -> impl Iterator<Item = Cow<'_, str>> {
+        self.places(row).map(|(values, i)| values.text(i))
     }
 
     /// Some rows, in their order.
     fn sweep(&self, rows: impl Iterator<Item = u64>) -> anyhow::Result<Sweep> {
         let keys = self.axes.iter().map(|axis| axis.key.clone()).collect();
-        let values = rows.map(|row| self.values(row)).collect();
+        let values = |row| self.places(row).map(|(values, i)| values.at(i)).collect();
+        let values = rows.map(values).collect();
         Ok(Sweep::new(&self.origin, self.base.clone(), keys, values)?)
     }
 
@@ -218,21 +236,25 @@ impl Grid {
     }
 
     /// A row of the file.
-    fn record(&self, row: u64, outcome: &Result<Row, ScenarioError>) -> Vec<String> {
-        let mut record = self.keys_of(row);
+    fn line(&self, row: u64, outcome: &Result<Row, ScenarioError>) -> anyhow::Result<Vec<u8>> {
+        let mut line = Line::new();
+        self.keys_of(row).try_for_each(|text| line.cell(text))?;
         let (metrics, detected) = match outcome {
             Ok(row) => (row.run.metrics, row.run.detected),
             Err(_) => Default::default(),
         };
-        let shown =
-            |x: Option<f64>| x.filter(|_| outcome.is_ok()).map_or_else(String::new, |x| x.to_string());
-        record.extend(figures(&metrics, &detected).into_iter().map(|(_, x)| shown(x)));
-        record.extend(match outcome {
-            Ok(row) => [row.certified.to_string(), String::new()],
+        for (_, figure) in figure_columns(&metrics, &detected) {
+            match figure.filter(|_| outcome.is_ok()) {
+                Some(figure) => line.cell(figure)?,
+                None => line.cell("")?,
+            }
+        }
+        match outcome {
+            Ok(row) => line.cell(row.certified).and_then(|()| line.cell(""))?,
             // A record is a line.
-            Err(e) => [String::new(), e.to_string().replace('\n', " ")],
-        });
-        record
+            Err(e) => line.cell("").and_then(|()| line.cell(e.to_string().replace('\n', " ")))?,
+        }
+        line.end()
     }
 
     /// Runs some rows; of a sweep that is stopped the first that have ended.
@@ -242,13 +264,15 @@ impl Grid {
         threads: usize,
         stop: &AtomicBool,
         progress: Report<'_>,
-    ) -> anyhow::Result<Vec<Result<Row, ScenarioError>>> {
+    ) -> anyhow::Result<Vec<Ended>> {
+        let first = rows.start;
         let sweep = self.sweep(rows)?;
-        let found: Mutex<Vec<Option<Result<Row, ScenarioError>>>> =
+        let found: Mutex<Vec<Option<Ended>>> =
             Mutex::new(std::iter::repeat_with(|| None).take(sweep.len()).collect());
-        sweep.run(threads, Keep::Figures, stop, &|i, row| {
+        sweep.run(threads, Keep::Figures, stop, &|i, outcome| {
+            let line = self.line(first + i as u64, &outcome);
             if let Ok(mut found) = found.lock() {
-                found[i] = Some(row);
+                found[i] = Some(Ended { line, refusal: outcome.err() });
             }
             if progress(Progress { total: self.rows, finished: 1 }).is_break() {
                 stop.store(true, Ordering::Relaxed);
@@ -258,16 +282,40 @@ impl Grid {
     }
 }
 
-/// The figures of a row by the names of their columns.
-fn figures(metrics: &Metrics, detected: &Detected) -> Vec<(&'static str, Option<f64>)> {
-    figure_columns(metrics, detected).collect()
+/// A row that has ended.
+struct Ended {
+    /// Its line of the file.
+    line: anyhow::Result<Vec<u8>>,
+    /// The reason, if it was refused.
+    refusal: Option<ScenarioError>,
 }
 
-/// A record as a line of CSV.
-fn line(record: &[String]) -> anyhow::Result<Vec<u8>> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    out.write_record(record)?;
-    Ok(out.into_inner()?)
+/// A line of CSV.
+struct Line {
+    cells: csv::Writer<Vec<u8>>,
+    /// The text of a cell.
+    text: String,
+}
+
+impl Line {
+    /// Bytes of most lines.
+    const USUAL: usize = 1024;
+
+    fn new() -> Self {
+        let cells = csv::WriterBuilder::new().buffer_capacity(Line::USUAL).from_writer(Vec::new());
+        Line { cells, text: String::new() }
+    }
+
+    fn cell(&mut self, cell: impl Display) -> anyhow::Result<()> {
+        self.text.clear();
+        write!(self.text, "{cell}")?;
+        Ok(self.cells.write_field(&self.text)?)
+    }
+
+    fn end(mut self) -> anyhow::Result<Vec<u8>> {
+        self.cells.write_record(None::<&[u8]>)?;
+        Ok(self.cells.into_inner()?)
+    }
 }
 
 /// A file that rows are added to, how many it has, and how many of them are refused.
@@ -306,8 +354,8 @@ impl SweepVerb {
                 let begun = Instant::now();
                 let found = grid.run(next.clone(), threads, &stop, progress)?;
                 if rows == 0
-                    && let Some(Err(first)) = found.first()
-                    && found.iter().all(Result::is_err)
+                    && let Some(Some(first)) = found.first().map(|row| &row.refusal)
+                    && found.iter().all(|row| row.refusal.is_some())
                     && !grid.any_runs()?
                 {
                     drop(std::fs::remove_file(&out));
@@ -318,13 +366,14 @@ impl SweepVerb {
                     };
                     bail!("none of the first {} rows{of} is a scenario that runs: {first}", found.len());
                 }
+                let ended = found.len() as u64;
                 let mut text = Vec::new();
-                for (row, outcome) in next.clone().zip(&found) {
-                    refused += u64::from(outcome.is_err());
-                    text.extend(line(&grid.record(row, outcome))?);
+                for row in found {
+                    refused += u64::from(row.refusal.is_some());
+                    text.extend(row.line?);
                 }
                 file.write_all(&text).and_then(|()| file.flush()).with_context(wrong)?;
-                rows += found.len() as u64;
+                rows += ended;
                 if rows < next.end {
                     return Ok(false);
                 }
@@ -375,7 +424,7 @@ fn begin(grid: &Grid, out: &Path) -> anyhow::Result<Begun> {
         bail!("{}: is there already; --resume goes on with it, or name another file", out.display());
     }
     let mut file = OpenOptions::new().write(true).create_new(true).open(out).with_context(wrong)?;
-    file.write_all(&line(&grid.header())?).with_context(wrong)?;
+    file.write_all(&grid.header()?).with_context(wrong)?;
     Ok(Begun { file, rows: 0, refused: 0 })
 }
 
@@ -383,6 +432,7 @@ fn begin(grid: &Grid, out: &Path) -> anyhow::Result<Begun> {
 fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::Result<Begun> {
     let name = out.display();
     let wrong = || format!("{}: cannot be read", out.display());
+    let header = grid.header()?;
     let mut reader = BufReader::new(File::open(out).with_context(wrong)?);
     let (mut last, mut length, mut lines, mut refused) = (Vec::new(), 0, 0_u64, 0);
     loop {
@@ -391,17 +441,19 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
         if next.last() != Some(&b'\n') {
             break; // the end, or a row that a kill has cut off
         }
-        if lines == 0 && next != line(&grid.header())? {
+        if lines == 0 && next != header {
             bail!("{name}: has other columns than this sweep; name another file");
         }
         if lines > 0 && lines <= grid.rows {
-            let mut begins = line(&grid.keys_of(lines - 1))?;
+            let mut begins = Line::new();
+            grid.keys_of(lines - 1).try_for_each(|text| begins.cell(text))?;
+            let mut begins = begins.end()?;
             begins.pop();
             begins.push(b',');
             ensure!(
                 next.starts_with(&begins),
                 "{name}: its row {lines} has other values than this sweep gives it, {}; name another file",
-                grid.keys_of(lines - 1).join(", ")
+                grid.keys_of(lines - 1).collect::<Vec<_>>().join(", ")
             );
             refused += u64::from(is_refused(&next));
         }
@@ -414,7 +466,7 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     ensure!(rows <= grid.rows, "{name}: has {rows} rows, and this sweep {}; name another file", grid.rows);
     if rows > 0 {
         let again = grid.run(rows - 1..rows, threads, stop, clutch_sim::progress::UNWATCHED)?;
-        let again = again.first().map(|row| line(&grid.record(rows - 1, row)));
+        let again = again.into_iter().next().map(|row| row.line);
         let same = again.transpose()?.is_some_and(|again| again == last);
         ensure!(
             same,
@@ -454,8 +506,9 @@ mod tests {
     fn the_last_key_runs_fastest() {
         let axes = vec![over("a=1,2").unwrap(), over("b=3,4,5").unwrap()];
         let grid = Grid { origin: String::new(), base: Table::new(), axes, rows: 6 };
-        let rows: Vec<Vec<i64>> =
-            (0..6).map(|row| grid.values(row).iter().filter_map(Value::as_integer).collect()).collect();
+        let rows: Vec<Vec<i64>> = (0..6)
+            .map(|row| grid.places(row).filter_map(|(values, i)| values.at(i).as_integer()).collect())
+            .collect();
         assert_eq!(rows, [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5]]);
     }
 }

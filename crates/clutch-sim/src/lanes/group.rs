@@ -19,18 +19,18 @@ const FEWEST: usize = 3;
 /// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places; `done` gets
 /// the figures of a run by its place, as they come. A run that it gets none of has to go alone. False once `stop`, which is
 /// asked every few milliseconds, says so; no more figures come then.
-pub(crate) fn run_all(
+pub(crate) fn run_all<'a>(
     level: Level,
-    runs: &[(usize, RunSpec<'_>)],
+    runs: impl Iterator<Item = (usize, RunSpec<'a>)>,
     stop: &dyn Fn() -> bool,
     done: &mut dyn FnMut(usize, EngineKind, Metrics, Detected),
 ) -> bool {
-    let mut candidates = Vec::new();
+    let mut candidates = Vec::with_capacity(runs.size_hint().1.unwrap_or(0));
     for (place, spec) in runs {
         if stop() {
             return false;
         }
-        candidates.extend(Candidate::of(*place, spec));
+        candidates.extend(Candidate::of(place, &spec));
     }
     let mut left: Vec<&Candidate<'_>> = candidates.iter().collect();
     while let Some(first) = left.first() {

@@ -188,7 +188,7 @@ type Told = Vec<(usize, crate::Metrics, Detected)>;
 fn together(level: Level, scenarios: &[Scenario], stop: &dyn Fn() -> bool) -> (Told, bool) {
     let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
     let mut told = Vec::new();
-    let whole = run_all(level, &specs, stop, &mut |place, _, m, d| told.push((place, m, d)));
+    let whole = run_all(level, specs.into_iter(), stop, &mut |place, _, m, d| told.push((place, m, d)));
     (told, whole)
 }
 

@@ -27,7 +27,7 @@ use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use crate::scenario_error::ScenarioError;
 use crate::tables::{
-    self, check, checked, complete, find, lookup, nearest, read, row_at, shown, with_todays_keys,
+    self, Place, check, checked, complete, find, lookup, nearest, read, shown, with_todays_keys,
 };
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
@@ -99,10 +99,10 @@ built_in!(
 /// A checked scenario.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    origin: String,
+    origin: Arc<str>,
     /// Contents of the file, and defaults: made of the tables of `base`, with `changes` not yet in it.
     base: Arc<Table>,
-    changes: Vec<(String, Value)>,
+    changes: Vec<(Arc<str>, Value)>,
     /// Both together, made when it is asked for: a sweep has thousands of scenarios, of which few are shown.
     table: OnceLock<Table>,
     params: ScenarioParams,
@@ -110,6 +110,15 @@ pub struct Scenario {
     map: Option<Arc<MapGrid>>,
     /// Made once: it walks the whole path.
     plan: Option<Plan>,
+}
+
+/// A key of which the rows of a sweep have values, found once for all of them.
+#[derive(Clone, Debug)]
+pub(crate) struct Setter {
+    key: Arc<str>,
+    place: Place,
+    /// The path knows nothing of it, and is not walked anew.
+    keeps_path: bool,
 }
 
 /// A scenario could not be loaded.
@@ -208,9 +217,30 @@ impl Scenario {
         Ok(scenario)
     }
 
+    /// A key of which there may be other values; none if it changes more than a value, as `rig.base` does, or a table of
+    /// points.
+    pub(crate) fn setter(&self, key: &str) -> Option<Setter> {
+        let place = Place::of(&self.params, key)?;
+        let plain = matches!(place.row.kind, Kind::Real | Kind::Whole | Kind::Switch | Kind::Word(_));
+        // A parameter that may be absent decides what else may be there.
+        if !plain || key == "rig.base" || place.row.optional {
+            return None;
+        }
+        let section = key.split('.').next().unwrap_or_default();
+        let keeps_path = matches!(section, "law" | "velocity" | "safety")
+            || (section == "rig" && !key.starts_with("rig.encoder") && key != "rig.speed_limit_deg_s");
+        Some(Setter { key: key.into(), place, keeps_path })
+    }
+
     /// This scenario with other values: what a row of a sweep is made of. Only what the keys touch is checked and
-    /// planned anew; none if one of the keys changes more than a value, as `rig.base` does, or a table of points.
-    pub(crate) fn with(&self, set: &[(String, Value)]) -> Option<Result<Scenario, ScenarioError>> {
+    /// planned anew.
+    ///
+    /// # Errors
+    /// The mistake, its place, and what is expected.
+    pub(crate) fn with<'a>(
+        &self,
+        set: impl Iterator<Item = (&'a Setter, &'a Value)>,
+    ) -> Result<Scenario, ScenarioError> {
         let mut scenario = Scenario {
             origin: self.origin.clone(),
             base: self.base.clone(),
@@ -221,35 +251,25 @@ impl Scenario {
             map: self.map.clone(),
             plan: None,
         };
-        // The path is walked anew unless all keys are ones that it knows nothing of.
         let mut keeps_path = true;
-        for (key, value) in set {
-            let mut found = None;
-            tables::set(&mut scenario.params, key, |row| {
-                let plain = matches!(row.kind, Kind::Real | Kind::Whole | Kind::Switch | Kind::Word(_));
-                // A parameter that may be absent decides what else may be there.
-                if !plain || key == "rig.base" || row.optional {
-                    return None;
-                }
-                let value = checked(&self.origin, key, row, value.clone());
-                found.insert(value).as_ref().ok().cloned()
-            });
-            match found? {
-                Ok(value) => scenario.changes.push((key.clone(), value)),
-                Err(e) => return Some(Err(e)),
-            }
-            let section = key.split('.').next().unwrap_or_default();
-            keeps_path &= matches!(section, "law" | "velocity" | "safety")
-                || (section == "rig" && !key.starts_with("rig.encoder") && key != "rig.speed_limit_deg_s");
+        for (Setter { key, place, keeps_path: keeps }, value) in set {
+            let value = checked(&self.origin, key, place.row, value.clone())?;
+            place.put(&mut scenario.params, &value);
+            scenario.changes.push((key.clone(), value));
+            keeps_path &= keeps;
         }
         let envelope = self.plan.as_ref().filter(|_| keeps_path).map(|plan| plan.envelope);
-        Some(scenario.make(envelope).map(|()| scenario))
+        scenario.make(envelope)?;
+        Ok(scenario)
     }
 
     /// This scenario with other values, checked.
     pub(crate) fn changed(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
-        let anew = || Scenario::from_table(&self.origin, self.table().clone(), set);
-        self.with(set).unwrap_or_else(anew)
+        let setters: Option<Vec<_>> = set.iter().map(|(key, _)| self.setter(key)).collect();
+        match setters {
+            Some(setters) => self.with(setters.iter().zip(set.iter().map(|(_, value)| value))),
+            None => Scenario::from_table(&self.origin, self.table().clone(), set),
+        }
     }
 
     /// The meaning of a parameter; none of a key that is no parameter of the scenario.
@@ -266,7 +286,7 @@ impl Scenario {
 
     /// The declaration of a parameter.
     pub(crate) fn row(&self, key: &str) -> Option<&'static Row> {
-        row_at(&self.params, key)
+        Place::of(&self.params, key).map(|place| place.row)
     }
 
     /// An error about a key that is there.
@@ -309,13 +329,14 @@ impl Scenario {
     /// Checks what relates parameters, and builds each part once, so that whatever is wrong is said before anything
     /// runs. `envelope` is what the path asks for, if it is known.
     fn make(&mut self, envelope: Option<Envelope<f64>>) -> Result<(), ScenarioError> {
-        if let Some((path, e)) = check(&self.params, "") {
+        if let Some((path, e)) = check(&mut self.params, "") {
             return Err(error_of(&self.origin, &path, self.table(), &e));
         }
         self.knots = self.read_knots()?;
         self.map = self.read_map()?;
-        self.check_parts()?;
-        let plan = self.make_plan(envelope)?;
+        let spec = self.spec();
+        self.check_parts(&spec)?;
+        let plan = self.make_plan(&spec, envelope)?;
         self.params.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
         self.plan = Some(plan);
         Ok(())
@@ -380,13 +401,12 @@ impl Scenario {
         self.message(&format!("reference.{kind}"), message)
     }
 
-    fn check_parts(&self) -> Result<(), ScenarioError> {
-        let spec = self.spec();
+    fn check_parts(&self, spec: &RunSpec<'_>) -> Result<(), ScenarioError> {
         // First: limits that are right for the one are wrong for the other.
-        self.check_actuator(&spec)?;
+        self.check_actuator(spec)?;
         match self.scalar() {
-            ScalarKind::F32 => self.check_servo::<f32>(&spec)?,
-            ScalarKind::F64 => self.check_servo::<f64>(&spec)?,
+            ScalarKind::F32 => self.check_servo::<f32>(spec)?,
+            ScalarKind::F64 => self.check_servo::<f64>(spec)?,
         }
         spec.run.check(spec.period).map_err(|e| self.at("run", &e))?;
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| self.at("rig", &e))?;
@@ -583,7 +603,8 @@ impl Scenario {
         self.table.get_or_init(|| {
             let mut table = Table::clone(&self.base);
             // Keys of rows that are there already: nothing can be wrong.
-            let _ = override_keys(&self.origin, &mut table, &self.changes);
+            let changes = self.changes.iter().map(|(key, value)| (&**key, value));
+            let _ = override_each(&self.origin, &mut table, changes);
             table
         })
     }
@@ -641,13 +662,18 @@ impl Scenario {
     /// # Errors
     /// None for a checked scenario.
     pub fn plan(&self) -> Result<Plan, ScenarioError> {
-        self.plan.clone().map_or_else(|| self.make_plan(None), Ok)
+        self.plan.clone().map_or_else(|| self.make_plan(&self.spec(), None), Ok)
     }
 
-    fn make_plan(&self, envelope: Option<Envelope<f64>>) -> Result<Plan, ScenarioError> {
+    /// True if the gains are certified in continuous time.
+    pub(crate) fn certified(&self) -> bool {
+        self.plan.as_ref().is_some_and(|plan| plan.certificate.certified())
+    }
+
+    fn make_plan(&self, spec: &RunSpec<'_>, envelope: Option<Envelope<f64>>) -> Result<Plan, ScenarioError> {
         let p = &self.params;
         let bounds = Bounds::around(&p.model, &p.bounds.tolerances).map_err(|e| self.at("", &e))?;
-        let servo = self.spec().servo().map_err(|e| self.at("rig", &e))?;
+        let servo = spec.servo().map_err(|e| self.at("rig", &e))?;
         let law = Law::new(&servo.law, &servo.beside()).map_err(|e| self.at("", &e))?;
         let envelope = envelope.map_or_else(|| self.walk_path(&bounds, law.output()), Ok)?;
         let demand = Demand {
@@ -781,7 +807,15 @@ fn actor(kind: ActuatorKind) -> &'static str {
 /// # Errors
 /// A name that is no key, or lies below a value.
 pub fn override_keys(origin: &str, table: &mut Table, set: &[(String, Value)]) -> Result<(), ScenarioError> {
-    set.iter().try_for_each(|(key, value)| written::set(origin, table, key, value.clone()))
+    override_each(origin, table, set.iter().map(|(key, value)| (key.as_str(), value)))
+}
+
+fn override_each<'a>(
+    origin: &str,
+    table: &mut Table,
+    mut set: impl Iterator<Item = (&'a str, &'a Value)>,
+) -> Result<(), ScenarioError> {
+    set.try_for_each(|(key, value)| written::set(origin, table, key, value.clone()))
 }
 
 fn read_table(origin: &str, text: &str) -> Result<Table, ScenarioError> {

@@ -31,8 +31,8 @@ pub fn check_section(origin: &str, key: &str, table: Table) -> Result<Table, Sce
     }
     written::set(origin, &mut whole, key, Value::Table(table.clone()))?;
     // Values that are not in the table stay blank, and are not looked at.
-    let params: ScenarioParams = read(&whole);
-    match check(&params, key) {
+    let mut params: ScenarioParams = read(&whole);
+    match check(&mut params, key) {
         None => Ok(table),
         Some((path, e)) => Err(error_of(origin, &path, &whole, &e)),
     }

@@ -4,9 +4,10 @@ use clutch_core::ParamError;
 use clutch_core::params::{Choice, Editor, Params, Table as Parameters};
 
 /// The first table at or below the key `within` whose parameters do not fit each other: its path, and the error.
-pub(crate) fn check<P: Params<f64>>(params: &P, within: &str) -> Option<(String, ParamError)> {
+/// Nothing is changed: an editor is what walks over parameters.
+pub(crate) fn check<P: Params<f64>>(params: &mut P, within: &str) -> Option<(String, ParamError)> {
     let mut checks = Checks { path: Vec::new(), within, found: None };
-    params.clone().edit(&mut checks);
+    params.edit(&mut checks);
     checks.found
 }
 
@@ -14,6 +15,16 @@ struct Checks<'a> {
     path: Vec<&'static str>,
     within: &'a str,
     found: Option<(String, ParamError)>,
+}
+
+impl Checks<'_> {
+    fn inside(&self) -> bool {
+        if self.within.is_empty() {
+            return true;
+        }
+        let path = self.path.join(".");
+        path.strip_prefix(self.within).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    }
 }
 
 impl Editor<f64> for Checks<'_> {
@@ -36,14 +47,11 @@ impl Editor<f64> for Checks<'_> {
         self.path.pop();
     }
     fn table<P: Parameters<f64>>(&mut self, table: &P) {
-        let path = self.path.join(".");
-        let rest = path.strip_prefix(self.within);
-        let inside = rest.is_some_and(|r| self.within.is_empty() || r.is_empty() || r.starts_with('.'));
         if self.found.is_none()
-            && inside
+            && self.inside()
             && let Err(e) = table.check_rows()
         {
-            self.found = Some((path, e));
+            self.found = Some((self.path.join("."), e));
         }
     }
 }

@@ -16,5 +16,5 @@ pub(crate) use complete::{
 };
 pub use leaves::{Points, Text};
 pub(crate) use read::{read, read_known};
-pub(crate) use set::{row_at, set};
+pub(crate) use set::Place;
 pub use suggest::{expected, nearest};
