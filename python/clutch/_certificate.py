@@ -11,8 +11,9 @@ class Certificate(_Record):
     """The check that gains hold every plant within the bounds to the sliding surface, and the largest distance from it.
 
     A certificate is true as a condition: ``if scenario.certificate(): …``. In it, time is continuous and the sensor
-    exact; sampling, encoder steps and delay come on top: `sampled` has what is said of them. docs/theory.md, section 8,
-    derives both.
+    exact; sampling, encoder steps and delay come on top: `sampled` has what is said of them. With
+    ``scenario.certificate(sampled=True)`` it is true if the error of the sampled loop has a proven bound. docs/theory.md,
+    section 8, derives both.
 
     Parameters
     ----------
@@ -261,7 +262,7 @@ class Certificate(_Record):
     class Sampled(_Record):
         """The verdicts on the loop as it is sampled, kept apart: error bound, linear stability, sticks.
 
-        The bound is looked for by ``clutch certify --sampled``, not here.
+        A bound is looked for by ``scenario.certificate(sampled=True)``.
 
         Parameters
         ----------
@@ -271,6 +272,8 @@ class Certificate(_Record):
             The loop and the plants that they speak of.
         any_law : bool
             True if the bound is one with any inner law, by a shell.
+        looked_for : bool
+            True if a proof of a bound was asked for.
         error_bound_rad : float or None
             Proven bound of the error, rad; None if there is none, or none was looked for.
         limiting_friction_sliding : tuple of float or None
@@ -300,6 +303,7 @@ class Certificate(_Record):
         not_covered: str | None
         scope: str | None
         any_law: bool
+        looked_for: bool
         error_bound_rad: float | None
         limiting_friction_sliding: tuple[float, ...] | None
         cells: int | None
@@ -324,5 +328,12 @@ class Certificate(_Record):
     sampled: Sampled
 
     def __bool__(self) -> bool:
-        """True if the gains are certified in continuous time, and the sampled loop is not known to be unstable."""
-        return self.certified and (self.sampled.stable is not False or self.sampled.any_law)
+        """True if the gains are certified as it was asked.
+
+        In continuous time, and the sampled loop is not known to be unstable; with ``sampled=True`` or ``check`` a bound of
+        the sampled loop is proven, and it is linearly stable or within a shell.
+        """
+        sampled = self.sampled
+        if sampled.looked_for:
+            return sampled.error_bound_rad is not None and (sampled.stable is True or sampled.any_law)
+        return self.certified and (sampled.stable is not False or sampled.any_law)

@@ -322,9 +322,10 @@ class Scenario:
         Acceleration of the plant (1) at time, position, velocity and brake voltage, rad/s²;
         0 at rest while friction holds.
         """
-    def certificate(self, /) -> dict[str, Any]:
+    def certificate(self, /, sampled: bool = False, save: str | PathLike[str] | None = None, check: str | PathLike[str] | None = None) -> dict[str, Any]:
         """
-        The object that `clutch certify --json` prints.
+        The object that `clutch certify --json` prints; with a proof that is looked for, and written to a file, or with one
+        that is read from a file.
         """
     @staticmethod
     def load(name: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Scenario:

@@ -163,23 +163,57 @@ class Scenario(_tables._Scenario):
             changes = {"rig": {"base": changes.pop("rig.base")}, **changes}
         return self._build(_clutch.Scenario.parse(self.name, self.to_toml(), changes).tables())
 
-    def certificate(self) -> Certificate:
+    def certificate(
+        self,
+        *,
+        sampled: bool = False,
+        save: str | os.PathLike[str] | None = None,
+        check: str | os.PathLike[str] | None = None,
+    ) -> Certificate:
         """Check the gains against every plant within the bounds.
+
+        Parameters
+        ----------
+        sampled
+            Look for a proof that bounds the error of the sampled loop as well: seconds to minutes on one core. Ctrl-C
+            returns at once; the search goes on in a thread of its own until it has ended, and is dropped.
+        save
+            Write that proof to this file, JSON, which `check`, ``clutch certify --check`` and ``clutch.loop(certificate=…)``
+            read. Nothing is written where nothing is proven.
+        check
+            Check the proof in this file, and that it is this scenario's, instead of looking for one: well below a second.
 
         Returns
         -------
         Certificate
-            The verdict, the gains that the bounds would need, and the farthest that the shaft strays.
+            The verdict, the gains that the bounds would need, and the farthest that the shaft strays; in its `sampled`
+            the verdicts on the sampled loop.
+
+        Raises
+        ------
+        ValueError
+            `save` without `sampled`, `check` with it; a file whose proof is another scenario's or does not hold.
+        OSError
+            A file that cannot be read or written.
 
         Examples
         --------
+        >>> import clutch
+        >>> import math
+        >>> unsure = clutch.Scenario.load("pd_2").override({"bounds.friction_percent": 5})
+        >>> certificate = unsure.certificate(sampled=True)
+        >>> if certificate:
+        ...     print(f"|e| stays below {math.degrees(certificate.sampled.error_bound_rad):.4f} °")
+        |e| stays below 0.0683 °
+
         >>> import clutch
         >>> certificate = clutch.Scenario.load("smc_2").override({"law.smc.kp_v": 2}).certificate()
         >>> if not certificate:
         ...     print(f"K_p must be {certificate.ahead.kp_required_v:.4f} V")
         K_p must be 2.2624 V
         """
-        return Certificate._build(self._native.certificate())
+        paths = (None if file is None else os.fspath(file) for file in (save, check))
+        return Certificate._build(self._native.certificate(sampled, *paths))
 
     def path(self) -> _clutch.Path:
         """Return the planned path, a target for each sampling period.

@@ -1086,6 +1086,45 @@ def test_a_certificate_comes_back_from_repr_pickle_and_replace():
         assert certificate.replace(law="mine") != certificate
 
 
+def test_the_error_of_the_sampled_loop_is_bounded_as_by_the_command(request, tmp_path):
+    command = request.getfixturevalue("clutch")
+    scenario, saved = clutch.Scenario.load("pd_2"), tmp_path / "pd.json"
+    printed = json.loads(command("certify", "pd_2", "--sampled", "--json").stdout)
+    certificate = scenario.certificate(sampled=True, save=saved)
+    assert json.loads(json.dumps(dataclasses.asdict(certificate))) == printed
+    assert certificate
+    assert certificate.sampled.looked_for
+    assert 0 < certificate.sampled.error_bound_rad < math.radians(0.1)
+    assert scenario.certificate(check=saved) == certificate
+    assert_nothing_is_lost(certificate)
+    # Not looked for, there is none.
+    assert scenario.certificate().sampled.error_bound_rad is None
+    # The proof is of these gains alone.
+    with pytest.raises(ValueError, match="another loop's"):
+        scenario.override({"law.pd.kp_v_rad": 4000}).certificate(check=saved)
+    # Certified in continuous time, and unstable as sampled.
+    unstable = clutch.Scenario.load("bench_pd_2").certificate(sampled=True, save=tmp_path / "none.json")
+    assert unstable.certified
+    assert not unstable
+    assert "unstable" in unstable.sampled.reason
+    assert not (tmp_path / "none.json").exists()
+
+
+def test_a_file_of_a_proof_that_cannot_be_is_refused(tmp_path):
+    scenario = clutch.Scenario.load("pd_2")
+    with pytest.raises(ValueError, match="sampled=True"):
+        scenario.certificate(save=tmp_path / "pd.json")
+    with pytest.raises(ValueError, match="without sampled=True"):
+        scenario.certificate(sampled=True, check=tmp_path / "pd.json")
+    with pytest.raises(FileNotFoundError, match=r"pd\.json"):
+        scenario.certificate(check=tmp_path / "pd.json")
+    with pytest.raises(ValueError, match="its folder does not exist"):
+        scenario.certificate(sampled=True, save=tmp_path / "no" / "pd.json")
+    (tmp_path / "pd.json").write_text("{}")
+    with pytest.raises(ValueError, match=r"pd\.json: no certificate"):
+        scenario.certificate(check=tmp_path / "pd.json")
+
+
 def test_a_gain_too_small_is_not_certified_and_the_one_asked_for_is():
     bounds = clutch.Bounds(friction_percent=20, brake_gain_percent=20, drive_torque_percent=10)
     scenario = clutch.Scenario.load("smc_2").replace(bounds=bounds)

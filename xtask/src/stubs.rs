@@ -78,7 +78,10 @@ const NAMED: &[(&str, &str)] = &[
     ("def told(self, /) -> Any:", "def told(self, /) -> dict[str, Any]:"),
     ("def claims(self, /) -> Any:", "def claims(self, /) -> list[dict[str, Any]]:"),
     ("def table3(self, /) -> Any:", "def table3(self, /) -> list[dict[str, float]]:"),
-    ("def certificate(self, /) -> Any:", "def certificate(self, /) -> dict[str, Any]:"),
+    (
+        "check: str | PathLike[str] | None = None) -> Any:",
+        "check: str | PathLike[str] | None = None) -> dict[str, Any]:",
+    ),
     ("def __iter__(self, /) -> Any: ...", "def __iter__(self, /) -> Iterator[str]: ..."),
     ("columns: Mapping, meanings", "columns: Mapping[str, ArrayLike], meanings"),
     ("def to_dict(self, /) -> dict:", "def to_dict(self, /) -> dict[str, Any]:"),

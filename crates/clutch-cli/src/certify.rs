@@ -2,6 +2,7 @@
 
 use crate::args::ScenarioArgs;
 use crate::output::{Exit, beside, check_files, json, paragraph, report, wrote};
+pub use crate::sampled::Asked;
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -43,26 +44,30 @@ pub(crate) struct Certify {
 
 impl Certify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
-        check_files(&self.save)?;
+        let asked = match (self.check, self.sampled) {
+            (Some(file), _) => Asked::Check(file),
+            (None, true) => Asked::Search(self.save),
+            (None, false) => Asked::Nothing,
+        };
+        check_proof_file(&asked)?;
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let rig =
             scenario.cannot_follow()?.map_or(String::new(), |reason| paragraph(&format!("note: {reason}")));
         let sampled = scenario.sampled(&plan.bounds);
-        let bound = match (&self.check, self.sampled) {
-            (Some(file), _) => Bound::of_file(&sampled, file)?,
-            (None, true) => Bound::search(&sampled, self.save.as_deref())?,
-            (None, false) => Bound::NotLookedFor,
+        let bound = Bound::of(&sampled, &asked)?;
+        let file = match &asked {
+            Asked::Search(Some(file)) => Some(file.as_path()),
+            _ => None,
         };
-        let saved: Vec<&Path> = self.save.iter().map(PathBuf::as_path).collect();
-        let saved = if bound.proven().is_some() { saved } else { Vec::new() };
+        let saved: Vec<&Path> = file.into_iter().filter(|_| bound.proven().is_some()).collect();
         report(
             self.json,
             || json(&whole(&scenario, &sampled, &bound)?),
             || text(&scenario, &plan, &outside) + &rig + &sampled::lines(&sampled, &bound) + &wrote(&saved),
         )?;
-        if let (Some(file), None) = (&self.save, bound.proven()) {
+        if let (Some(file), None) = (file, bound.proven()) {
             eprintln!("{}: not written: nothing is proven", file.display());
         }
         let certified = match bound {
@@ -282,13 +287,24 @@ fn printed(p: &PaperConditions) -> String {
     )
 }
 
+/// Refuses a file that cannot be written before a proof is looked for.
+fn check_proof_file(asked: &Asked) -> anyhow::Result<()> {
+    match asked {
+        Asked::Search(file) => check_files(file),
+        _ => Ok(()),
+    }
+}
+
 /// A scenario's certificate: the object that `--json` prints, described in `docs/scenario.md`.
 ///
 /// # Errors
-/// A path that a brake cannot follow.
-pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
+/// A path that a brake cannot follow; a file that cannot be written, or proves nothing for this scenario.
+pub fn certificate(scenario: &Scenario, asked: &Asked) -> anyhow::Result<Value> {
+    check_proof_file(asked)?;
     let plan = scenario.plan()?;
-    whole(scenario, &scenario.sampled(&plan.bounds), &Bound::NotLookedFor)
+    let sampled = scenario.sampled(&plan.bounds);
+    let bound = Bound::of(&sampled, asked)?;
+    Ok(whole(scenario, &sampled, &bound)?)
 }
 
 fn whole(scenario: &Scenario, sampled: &Sampled, bound: &Bound) -> Result<Value, ScenarioError> {

@@ -4,7 +4,18 @@ use crate::output::paragraph;
 use clutch_certificate::file;
 use clutch_sim::scenario::{CertificateError, Proven, STICKS, Sampled, Unproven};
 use serde_json::{Value, json as value};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The question about the error as sampled.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// None.
+    Nothing,
+    /// A proof is looked for, and written to a file if one is named.
+    Search(Option<PathBuf>),
+    /// The proof in a file is checked.
+    Check(PathBuf),
+}
 
 /// The verdict on the error as sampled.
 pub(crate) enum Bound {
@@ -21,8 +32,16 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
+    pub(crate) fn of(sampled: &Sampled, asked: &Asked) -> anyhow::Result<Bound> {
+        match asked {
+            Asked::Nothing => Ok(Bound::NotLookedFor),
+            Asked::Search(save) => Bound::search(sampled, save.as_deref()),
+            Asked::Check(file) => Bound::of_file(sampled, file),
+        }
+    }
+
     /// Looks for a proof, checks it, and saves it if asked.
-    pub(crate) fn search(sampled: &Sampled, save: Option<&Path>) -> anyhow::Result<Bound> {
+    fn search(sampled: &Sampled, save: Option<&Path>) -> anyhow::Result<Bound> {
         let (proven, certificate) = match sampled.prove() {
             Ok(found) => found,
             Err(Unproven::NotCovered(why)) => return Ok(Bound::NotCovered(why.to_string())),
@@ -31,13 +50,13 @@ impl Bound {
             Err(defect @ Unproven::Refused(_)) => return Err(defect.into()),
         };
         if let Some(path) = save {
-            file::write(path, &certificate)?;
+            file::write(path, &certificate).map_err(CertificateError::from)?;
         }
         Ok(Bound::Proven(proven))
     }
 
     /// Checks the proof of a file, and that it is this scenario's.
-    pub(crate) fn of_file(sampled: &Sampled, path: &Path) -> anyhow::Result<Bound> {
+    fn of_file(sampled: &Sampled, path: &Path) -> anyhow::Result<Bound> {
         match sampled.proven_by(path) {
             Ok(proven) => Ok(Bound::Proven(proven)),
             Err(CertificateError::NotCovered(why)) => Ok(Bound::NotCovered(why.to_string())),
@@ -110,6 +129,7 @@ pub(crate) fn json(sampled: &Sampled, bound: &Bound) -> Value {
     value!({
         "not_covered": sampled.setup.as_ref().err().map(ToString::to_string),
         "scope": sampled.setup.as_ref().ok().map(|_| sampled.scope()),
+        "looked_for": !matches!(bound, Bound::NotLookedFor),
         "error_bound_rad": bound.proven(),
         "limiting_friction_sliding": proven.map(|p| p.checked.limiting),
         "any_law": sampled.any_law(),

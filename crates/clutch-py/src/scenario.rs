@@ -1,19 +1,23 @@
 //! Checked scenarios, and the checks of single tables.
 
 use crate::convert::{
-    core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
+    core_error, from_json, from_table, load_error, os_error, overrides, param_error, scenario_error, to_table,
 };
 use crate::path::Path;
+use clutch_certificate::file::FileError;
+use clutch_cli::certify::{Asked, certificate};
 use clutch_core::{BrakeGeometry, Friction, FrictionModel};
 use clutch_sim::ScenarioError;
 use clutch_sim::friction_lab::examine;
 use clutch_sim::rig::Rig;
-use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
+use clutch_sim::scenario::{BUILT_IN, CertificateError, check_section, override_keys};
 use numpy::{PyArray1, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 use toml::{Table, Value};
 
 /// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public form.
@@ -24,6 +28,18 @@ pub(crate) struct Scenario(pub(crate) Arc<clutch_sim::Scenario>);
 impl Scenario {
     pub(crate) fn error(&self, py: Python<'_>, e: &ScenarioError) -> PyErr {
         scenario_error(py, e, Some(self.0.table()))
+    }
+
+    fn certificate_error(&self, py: Python<'_>, e: &anyhow::Error) -> PyErr {
+        let file = match e.downcast_ref::<CertificateError>() {
+            Some(CertificateError::File(file)) => Some(file),
+            _ => e.downcast_ref::<FileError>(),
+        };
+        match (e.downcast_ref::<ScenarioError>(), file) {
+            (Some(e), _) => self.error(py, e),
+            (_, Some(FileError::Io { name, error })) => os_error(py, name.as_ref(), &e.to_string(), error),
+            _ => PyValueError::new_err(e.to_string()),
+        }
     }
 }
 
@@ -56,11 +72,7 @@ impl Scenario {
     /// Reads a scenario from a file or, if there is none, the built-in one of that name.
     #[staticmethod]
     #[pyo3(signature = (name, overrides=None))]
-    fn load(
-        py: Python<'_>,
-        name: std::path::PathBuf,
-        overrides: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Scenario> {
+    fn load(py: Python<'_>, name: PathBuf, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scenario> {
         let set = self::overrides(overrides)?;
         let (origin, text) = clutch_sim::Scenario::text(&name).map_err(|e| load_error(py, &e))?;
         parse(py, &origin, &text, &set)
@@ -76,10 +88,44 @@ impl Scenario {
         self.0.canonical()
     }
 
-    /// The object that `clutch certify --json` prints.
-    fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = py.detach(|| clutch_cli::certify::certificate(&self.0));
-        from_json(py, &found.map_err(|e| self.error(py, &e))?)
+    /// The object that `clutch certify --json` prints; with a proof that is looked for, and written to a file, or with one
+    /// that is read from a file.
+    #[pyo3(signature = (sampled=false, save=None, check=None))]
+    fn certificate<'py>(
+        &self,
+        py: Python<'py>,
+        sampled: bool,
+        save: Option<PathBuf>,
+        check: Option<PathBuf>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let asked = match (sampled, save, check) {
+            (false, None, None) => Asked::Nothing,
+            (true, save, None) => Asked::Search(save),
+            (false, None, Some(file)) => Asked::Check(file),
+            (false, Some(_), _) => {
+                return Err(PyValueError::new_err(
+                    "save: expected with sampled=True, which looks for a proof",
+                ));
+            }
+            (true, _, Some(_)) => {
+                return Err(PyValueError::new_err(
+                    "check: expected without sampled=True: a proof is read from a file, or looked for",
+                ));
+            }
+        };
+        let scenario = self.0.clone();
+        if asked == Asked::Nothing {
+            let found = py.detach(|| certificate(&scenario, &asked));
+            return from_json(py, &found.map_err(|e| self.certificate_error(py, &e))?);
+        }
+        // A search takes up to minutes and does not stop half-way: Ctrl-C leaves it to itself.
+        let work = std::thread::spawn(move || certificate(&scenario, &asked));
+        while !work.is_finished() {
+            py.detach(|| std::thread::sleep(Duration::from_millis(1)));
+            py.check_signals()?;
+        }
+        let found = work.join().map_err(|_| PyRuntimeError::new_err("the search for a proof broke"))?;
+        from_json(py, &found.map_err(|e| self.certificate_error(py, &e))?)
     }
 
     /// The path, sampled.
