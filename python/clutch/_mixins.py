@@ -70,7 +70,8 @@ class Friction(_Params):
         dict of str to Table
             ``steady``: velocity, rad/s, and coefficient of steady sliding. ``pre_sliding``: angle, rad, and coefficient
             of a slow motion to and fro. ``lag``: velocity and coefficient of a velocity that swings. ``break_away``:
-            rate at which a torque grows, N m/s, and coefficient at which the paper's shaft breaks away.
+            rate at which a torque grows, N m/s, and the largest coefficient of the friction, at which the paper's shaft
+            breaks away.
 
         Examples
         --------

@@ -855,7 +855,7 @@ def friction(*frictions: Friction, labels: Sequence[str] | None = None) -> Figur
     -------
     matplotlib.figure.Figure
         Steady sliding over the velocity in rad/s, pre-sliding over the angle in mrad, lag over the velocity in mrad/s,
-        break-away over the rate of torque in N m/s.
+        the largest coefficient, at the break-away, over the rate of torque in N m/s.
 
     Raises
     ------

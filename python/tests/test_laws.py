@@ -161,8 +161,25 @@ def test_a_plant_is_put_somewhere_else():
     assert (plant.velocity, plant.stuck) == (0.0, True)
     assert plant.counts == math.floor(0.25 * 20_000 / (2 * math.pi))
     for bad in [{"position_rad": math.nan}, {"position_rad": 1e9}, {"position_rad": 0.0, "velocity_rad_s": math.inf}]:
-        with pytest.raises(ValueError, match="expected a finite number"):
+        with pytest.raises(ValueError, match=rf"^{next(reversed(bad))} = .*: expected a finite"):
             plant.place(**bad)
+    with pytest.raises(ValueError, match="voltage_v = 1.1e1: expected a voltage of the converter, -10 to 10 V"):
+        plant.place(0.0, voltage_v=11)
+
+
+def test_a_plant_that_is_put_somewhere_with_a_voltage_has_forgotten_what_was_before():
+    lags = {"rig.delay_ticks": 2, "rig.actuator_time_constant_s": 0.003}
+    for rig in [{"rig.friction": {"lugre": {}}}, {"rig.friction": {"maxwell": {}}}, lags]:
+        ends = set()
+        for before in [0.5, 2.5, 8.0]:
+            plant = clutch.Plant(clutch.Scenario.load("pd_2").override(rig))
+            for _ in range(100):
+                plant.step(before)
+            plant.place(0.0, voltage_v=3.0)
+            for _ in range(100):
+                plant.step(2.0)
+            ends.add((plant.position, plant.velocity))
+        assert len(ends) == 1, rig
 
 
 def test_a_spoilt_pickle_is_refused():

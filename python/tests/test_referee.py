@@ -33,6 +33,34 @@ def test_scipy_and_this_package_find_what_a_case_expects(name):
     assert ("scipy" in {r.engine for r in results}) == (case.mechanism is not None)
 
 
+def test_scipy_sees_a_break_away_that_is_over_within_a_step():
+    # The load is above what friction bears for a hundredth of its period, at any place against the solver's steps.
+    for phase in np.linspace(0, 0.2, 9):
+        case = referee.Case(f"""
+            id = "S1"
+            title = "A sine that is just above the friction"
+            source = "analytic"
+            duration_s = 0.75
+            sample_s = 0.01
+            [mechanism]
+            inertia = [[1.0]]
+            load = [[{{ amplitude = 1.0005, frequency_hz = 1.0, phase_turns = {-phase} }}]]
+            [[mechanism.row]]
+            joints = [1.0]
+            normal = [{{ constant = 1.0 }}]
+            friction.coulomb = {{ mu_static = 1.0, mu_dynamic = 1.0 }}
+            [[expect]]
+            name = "break-away"
+            value = {phase + np.arcsin(1 / 1.0005) / (2 * np.pi)}
+            within = 1e-9
+            unit = "s"
+            observe = {{ kind = "slips" }}
+        """)
+        (result,) = referee.compare([case], [SciPy()])
+        assert result.failed is None, result.failed
+        assert result.held == 1, (phase, result.figures)
+
+
 def test_a_straw_man_creeps_where_friction_holds():
     results = {r.engine: r for r in referee.compare([CASES["C1"]], [Tanh(), Makkar(), Karnopp(), Armstrong()])}
     for name in ("tanh", "makkar"):

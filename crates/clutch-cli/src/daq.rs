@@ -95,6 +95,7 @@ impl Daq {
             seed: self.fault_seed,
             patient: self.patient,
             wait: WaitMode::Sleep,
+            passed: std::sync::Arc::default(),
         };
         let report = sim_board_server::serve(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
             // A terminal that has gone away does not stop a board.

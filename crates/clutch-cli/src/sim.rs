@@ -18,7 +18,7 @@ use clutch_sim::metrics::Detected;
 use clutch_sim::picture::{Envelope, Window};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::reaching::Reaching;
-use clutch_sim::rig::{Rig, not_passive};
+use clutch_sim::rig::{NotPassive, Rig};
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -73,6 +73,9 @@ pub(crate) struct Summary<'a> {
     /// Viscous damping that the rig's bristles lack to be passive, N m s/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     bristles_lack_nm_s_rad: Option<f64>,
+    /// The same with its voltage.
+    #[serde(skip)]
+    not_passive: Option<NotPassive>,
 }
 
 #[derive(Serialize)]
@@ -145,6 +148,8 @@ impl<'a> Summary<'a> {
     pub(crate) fn of(scenario: &'a Scenario, run: &'a Run) -> anyhow::Result<Summary<'a>> {
         let plan = scenario.plan()?;
         let as_sampled = scenario.sampled(&plan.bounds);
+        let spec = scenario.spec();
+        let not_passive = Rig::new(&spec.rig, spec.run.seed)?.not_passive(&spec.output);
         Ok(Summary {
             scenario: scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
@@ -168,8 +173,8 @@ impl<'a> Summary<'a> {
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
             rig_cannot_follow: scenario.cannot_follow()?,
             friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
-            bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
-                .lacks_damping(scenario.spec().output.highest),
+            bristles_lack_nm_s_rad: not_passive.map(|found| found.lacks),
+            not_passive,
         })
     }
 }
@@ -253,8 +258,8 @@ fn text(s: &Summary<'_>, scenario: &Scenario, run: &Run) -> String {
             number(jump.to_degrees())
         ));
     }
-    if let Some(lacks) = s.bristles_lack_nm_s_rad {
-        text += &paragraph(&format!("note: {}", not_passive(lacks)));
+    if let Some(bristles) = s.not_passive {
+        text += &paragraph(&format!("note: {bristles}"));
     }
     text
 }

@@ -74,6 +74,16 @@ impl Seen {
         self.least > self.high || self.most < self.low
     }
 
+    /// The figures between which friction is known to be, in words.
+    fn interval(&self) -> String {
+        let least = number(self.least);
+        if self.most.is_finite() {
+            format!("{least} to {}", number(self.most))
+        } else {
+            format!("at least {least}")
+        }
+    }
+
     /// As far within the bounds as a mean is known: bounds may be a single point.
     fn inside(&self) -> bool {
         self.friction >= self.low * (1.0 - RESOLUTION - INVERSE)
@@ -133,8 +143,9 @@ impl DriftReport {
     pub fn words(&self) -> String {
         match &self.last {
             Some(last) => format!(
-                "{} of the model's, {} to {} in the run; bounds {} {}, {}left{}",
+                "{} of the model's ({}), means of {} to {} in the run; bounds {} {}, {}left{}",
                 number(last.friction),
+                last.interval(),
                 number(self.range.0),
                 number(self.range.1),
                 number(last.low),
@@ -159,16 +170,12 @@ impl DriftReport {
     pub fn alarm_words(&self, alarm: &Alarm) -> String {
         let seen = &alarm.seen;
         let (way, bound) = if seen.least > seen.high { ("above", seen.high) } else { ("below", seen.low) };
-        let least = number(seen.least);
-        let interval = match seen.most.is_finite() {
-            true => format!("{least} to {}", number(seen.most)),
-            false => format!("at least {least}"),
-        };
         format!(
-            "DRIFT at {} s: {} is {} of the model's ({interval}), {way} the bound of {}",
+            "DRIFT at {} s: {} is {} of the model's ({}), {way} the bound of {}",
             number(alarm.tick as f64 * self.period),
             self.label(),
             number(seen.friction),
+            seen.interval(),
             number(bound)
         )
     }

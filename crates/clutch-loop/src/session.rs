@@ -39,7 +39,7 @@ use clutch_sim::{Scenario, ScenarioError, number};
 use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::{JoinHandle, ScopedJoinHandle};
 use std::time::Duration;
 
@@ -325,6 +325,7 @@ impl Session {
     /// # Errors
     /// Obstacles that keep the run from beginning: port, board, log. The cause that ends it later is in the summary.
     pub fn run(&self, stop: &Arc<AtomicBool>, event: &mut dyn FnMut(Event)) -> Result<Summary, SessionError> {
+        let passed = Arc::default();
         let (simulated, address, faults) = match &self.options.board {
             Board::Daq(address) | Board::Controller(address) => (None, address.clone(), 0),
             Board::Simulated { faults, seed, .. } => {
@@ -333,12 +334,13 @@ impl Session {
                     seed: *seed,
                     patient: self.patient(),
                     wait: WaitMode::Sleep,
+                    passed: Arc::clone(&passed),
                 };
                 let (board, address) = SimulatedBoard::start(&self.scenario, options)?;
                 (Some(board), address, faults.len())
             }
         };
-        let mut course = Course { session: self, address: &address, stop, event };
+        let mut course = Course { session: self, address: &address, stop, passed, event };
         let ran = match (&self.options.board, self.scenario.scalar()) {
             (Board::Controller(_), _) => course.on_controller(),
             (_, ScalarKind::F32) => course.on_daq::<f32>(),
@@ -412,6 +414,8 @@ struct Course<'a> {
     session: &'a Session,
     address: &'a Address,
     stop: &'a Arc<AtomicBool>,
+    /// As [`Watch::passed`], for a simulated board.
+    passed: Arc<AtomicU32>,
     event: &'a mut dyn FnMut(Event),
 }
 
@@ -710,7 +714,8 @@ impl Course<'_> {
         gains: Option<Arc<dyn LiveGains>>,
     ) -> Result<Logging, SessionError> {
         let Session { scenario, options, .. } = self.session;
-        let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
+        let (stop, passed) = (self.stop.clone(), self.passed.clone());
+        let watch = Arc::new(Watch { stop, passed, ..Watch::default() });
         let port = self.address.to_string();
         let mut header = from_scenario::header(scenario, &built.servo, Source::Loop, &port, &options.version);
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));

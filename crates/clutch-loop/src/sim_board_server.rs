@@ -16,7 +16,8 @@ use clutch_node::Outbox;
 use clutch_sim::Scenario;
 use clutch_wire::BoardState;
 use std::hash::{BuildHasher, Hasher};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 /// Longest time for which a patient board waits.
@@ -39,6 +40,8 @@ pub struct ServeOptions {
     pub patient: bool,
     /// The way in which it waits for its next sample.
     pub wait: WaitMode,
+    /// The newest sample that a loop in this process left without an answer, by its number and 1; 0 before.
+    pub passed: Arc<AtomicU32>,
 }
 
 /// A notice of the board while it runs.
@@ -143,7 +146,10 @@ pub fn serve(
         if board.next_ns().is_some_and(|due| due <= now) {
             let wall = monotonic_ns();
             let since = *waiting_since.get_or_insert(wall);
-            let held_up = patient && present && !board.node().is_answered();
+            // A sample that the loop does not believe gets no answer; nothing holds it up.
+            let passed = options.passed.load(Ordering::Relaxed);
+            let unanswered = board.node().unanswered().filter(|sample| u32::from(*sample) + 1 != passed);
+            let held_up = patient && present && unanswered.is_some();
             if held_up && wall - since < PATIENCE.as_nanos() as u64 {
                 // The clock stands still, a little before the sample, until the answer comes.
                 slipped = wall - now + WAIT_NS;

@@ -2,7 +2,7 @@
 
 use crate::drift::{Alarm, Seen};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 /// The values that a watcher sees while the loop runs.
 #[derive(Debug, Default)]
@@ -27,6 +27,8 @@ pub struct Watch {
     pub log_ended: AtomicBool,
     /// Alarms of drift.
     pub drift: SharedAlarm,
+    /// The newest sample that was left without an answer, by its number and 1; 0 before.
+    pub passed: Arc<AtomicU32>,
 }
 
 /// An alarm of drift from one thread for another.

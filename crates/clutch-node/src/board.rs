@@ -222,11 +222,12 @@ impl BoardNode {
         self.fed_us
     }
 
-    /// True if the newest sample has been answered, or needs no answer.
+    /// The number of the newest sample, if it needs an answer that has not come.
     #[must_use]
-    pub fn is_answered(&self) -> bool {
+    pub fn unanswered(&self) -> Option<u16> {
+        let newest = self.sequence.wrapping_sub(1);
         let awaited = self.driving() && self.sequence != self.armed_at;
-        !awaited || self.answered == Some(self.sequence.wrapping_sub(1))
+        (awaited && self.answered != Some(newest)).then_some(newest)
     }
 
     pub(crate) fn driving(&self) -> bool {

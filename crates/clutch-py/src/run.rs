@@ -11,7 +11,7 @@ use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::columns;
 use clutch_sim::picture::{Around, Envelope, PARTS, Stick, Window, sticks};
 use clutch_sim::progress::Progress;
-use clutch_sim::rig::{Rig, not_passive};
+use clutch_sim::rig::Rig;
 use clutch_sim::smooth_speed::{self, Trials};
 use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
 use numpy::PyReadonlyArray1;
@@ -65,7 +65,7 @@ pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<
     let run = Arc::new(run.map_err(|e| scenario.error(py, &e))?);
     let spec = scenario.0.spec();
     let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
-    let lacks = rig.lacks_damping(spec.output.highest).map(not_passive);
+    let lacks = rig.not_passive(&spec.output).map(|lacks| lacks.to_string());
     let cannot = scenario.0.cannot_follow().map_err(|e| scenario.error(py, &e))?;
     let invalid = run.trace.limit.iter().filter(|limit| **limit == Limit::Invalid).count();
     let not_a_number = python_law.as_ref().filter(|_| invalid > 0).map(|law| {

@@ -525,7 +525,9 @@ impl Plant {
         event_table(&self.events)
     }
 
-    /// Puts the shaft somewhere else: its time, its voltages and what is random go on.
+    /// Puts the shaft somewhere else: its time and what is random go on.
+    ///
+    /// Bristles, if its friction has some, bend as in steady sliding, at rest as they have to under the voltage at the pad.
     ///
     /// Parameters
     /// ----------
@@ -533,26 +535,34 @@ impl Plant {
     ///     Position of the shaft, rad.
     /// velocity_rad_s : float, optional
     ///     Its velocity, rad/s; 0 is at rest.
+    /// voltage_v : float, optional
+    ///     Voltage that the converter has given since long, V; absent: the voltages go on, also those that are still on
+    ///     their way through delay and lag.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A number that is not finite, or a position beyond the encoder's counts.
-    #[pyo3(signature = (position_rad, velocity_rad_s=0.0))]
-    fn place(&mut self, position_rad: f64, velocity_rad_s: f64) -> PyResult<()> {
-        let per_radian: f64 = self.moving.rig().encoder.counts_per_radian();
-        let counted = (position_rad * per_radian).abs() < f64::from(i32::MAX);
-        for (name, value, good) in [
-            ("position_rad", position_rad, counted),
-            ("velocity_rad_s", velocity_rad_s, velocity_rad_s.is_finite()),
-        ] {
-            if !good {
-                let text =
-                    format!("{name} = {value}: expected a finite number, a position within ±2³¹ counts");
-                return Err(PyValueError::new_err(text));
-            }
+    ///     A number that is not finite, a position beyond the encoder's counts, a voltage beyond the converter's.
+    #[pyo3(signature = (position_rad, velocity_rad_s=0.0, voltage_v=None))]
+    fn place(&mut self, position_rad: f64, velocity_rad_s: f64, voltage_v: Option<f64>) -> PyResult<()> {
+        let refused = |name: &str, value: f64, expected: String| {
+            Err(PyValueError::new_err(format!("{name} = {value:e}: expected {expected}")))
+        };
+        let rig = self.moving.rig();
+        let per_radian: f64 = rig.encoder.counts_per_radian();
+        if !((position_rad * per_radian).abs() < f64::from(i32::MAX)) {
+            return refused("position_rad", position_rad, "a finite position within ±2³¹ counts".to_owned());
         }
-        self.moving.place(position_rad, velocity_rad_s);
+        if !velocity_rad_s.is_finite() {
+            return refused("velocity_rad_s", velocity_rad_s, "a finite velocity".to_owned());
+        }
+        let converter = &rig.params.dac.converter;
+        let reached = converter.lowest..=converter.highest;
+        if let Some(volts) = voltage_v.filter(|volts| !reached.contains(volts)) {
+            let expected = format!("a voltage of the converter, {} to {} V", reached.start(), reached.end());
+            return refused("voltage_v", volts, expected);
+        }
+        self.moving.place(position_rad, velocity_rad_s, voltage_v);
         self.broken = false;
         Ok(())
     }

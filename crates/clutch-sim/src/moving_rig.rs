@@ -233,8 +233,13 @@ impl MovingRig {
         Ok(&self.events)
     }
 
-    /// Puts the shaft at a position (rad) and a velocity (rad/s); all else goes on.
-    pub fn place(&mut self, position: f64, velocity: f64) {
+    /// Puts the shaft at a position (rad) and a velocity (rad/s), under these volts since long or under those that there
+    /// are; all else goes on. Bristles bend as in steady sliding, at rest as they have to under the volts at the pad.
+    pub fn place(&mut self, position: f64, velocity: f64, volts: Option<f64>) {
+        if let Some(volts) = volts {
+            self.reset(volts);
+            (self.volts, self.arriving) = (volts, volts);
+        }
         self.shaft = begin(&self.rig, position, velocity, self.volts);
         match &mut self.engine {
             Moves::Exactly(_) => {}

@@ -4,11 +4,13 @@ use crate::drive::{Drive, DriveParams};
 use crate::engine::{ExactFlow, Model};
 use crate::ripple::{Ripple, RippleParams, RunoutParams};
 use clutch_core::friction::{FrictionModel, FrictionParams};
+use clutch_core::law::OutputParams;
 use clutch_core::params::{Params, Range};
 use clutch_core::{
     ActuatorKind, ActuatorParams, Dac, DacParams, Encoder, EncoderParams, ParamError, Plant, PlantParams,
     SpeedLimit, params,
 };
+use std::fmt;
 
 clutch_core::words! {
     /// Rig that a scenario's own is laid over.
@@ -142,14 +144,27 @@ impl Default for RigParams {
     }
 }
 
-/// The note on a rig whose bristles lack so much viscous damping, N m s/rad: [`Rig::lacks_damping`].
-#[must_use]
-pub fn not_passive(lacks: f64) -> String {
-    format!(
-        "at the highest voltage the bristles of the friction can give energy: they are passive with {} N m s/rad more of \
-         rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
-        crate::number(lacks)
-    )
+/// The viscous damping that bristles lack to take energy out of every motion: [`Rig::not_passive`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NotPassive {
+    /// N m s/rad.
+    pub lacks: f64,
+    /// The voltage that presses hardest, V; none if all press alike.
+    pub at: Option<f64>,
+}
+
+impl fmt::Display for NotPassive {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(volts) = self.at {
+            write!(f, "at {volts} V ")?;
+        }
+        write!(
+            f,
+            "the bristles of the friction can give energy: they are passive with {} N m s/rad more of \
+             rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
+            crate::number(self.lacks)
+        )
+    }
 }
 
 /// A checked rig.
@@ -248,13 +263,17 @@ impl Rig {
         self.reached(if actuator.kind().two_sided() { volts } else { volts.max(0.0) })
     }
 
-    /// Viscous damping that bristles lack, at a voltage, to take energy out of every motion, N m s/rad; none if they do not.
+    /// Bristles that can give energy at a voltage within the output's limits; none if they take it out of every motion.
     #[must_use]
-    pub fn lacks_damping(&self, volts: f64) -> Option<f64> {
+    pub fn not_passive(&self, output: &OutputParams) -> Option<NotPassive> {
         let plant = &self.model.plant;
-        let needed = plant.friction().bristles()?.passive_from() * plant.actuator().normal(volts);
-        let lacks = needed - plant.params().viscous_damping;
-        (lacks > 0.0).then_some(lacks)
+        let bristles = plant.friction().bristles()?;
+        let [low, high] = [output.lowest, output.highest].map(|volts| plant.actuator().normal(volts));
+        let (normal, volts) = if low > high { (low, output.lowest) } else { (high, output.highest) };
+        let lacks = bristles.passive_from() * normal - plant.params().viscous_damping;
+        // A motor presses by its torque, if at all.
+        let at = (normal > plant.actuator().normal(0.0)).then_some(volts);
+        (lacks > 0.0).then_some(NotPassive { lacks, at })
     }
 
     /// A voltage within the converter's range; 0 for none, as where there is no friction to divide by.

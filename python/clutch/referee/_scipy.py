@@ -6,8 +6,10 @@ Rows without bristles: DOP853 between events, which `solve_ivp` finds; at an eve
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,8 @@ __all__ = ["SciPy", "level", "sampled"]
 _Vector = NDArray[np.float64]
 #: Slip rate that counts as none after an event, relative to the fastest.
 _AT_REST = 1e-9
+#: Parts of a step in which an event is looked for that comes and goes.
+_WITHIN = 4
 #: Time after a break-away at which it shows which rows go, s.
 _AHEAD = 1e-9
 
@@ -351,12 +355,15 @@ class _Rigid:
             )
             if done.status < 0:
                 raise ArithmeticError(f"DOP853 gave up: {done.message}")
-            until = float(done.t[-1])
-            while written < len(times) and times[written] <= until:
-                states[:, written] = done.sol(times[written]) if times[written] < until else done.y[:, -1]
-                written += 1
+            until, y = float(done.t[-1]), done.y[:, -1]
             happened = [i for i, at in enumerate(done.t_events or []) if len(at)]
-            y, t, before = done.y[:, -1], until, self.modes.copy()
+            if (passed := _passed_over(done, watch)) is not None:
+                until, which = passed
+                y, happened = done.sol(until), [which]
+            while written < len(times) and times[written] <= until:
+                states[:, written] = done.sol(times[written]) if times[written] < until else y
+                written += 1
+            t, before = until, self.modes.copy()
             crossed = none.copy()
             crossed[[slipping[i] for i in happened if i < len(slipping)]] = True
             lets_go = any(i >= len(slipping) for i in happened)
@@ -368,6 +375,36 @@ class _Rigid:
                 (t, int(i), bool(self.modes[i] == 0)) for i in np.flatnonzero((before == 0) != (self.modes == 0))
             ]
         return Trajectory(states[:n], states[n:], None, events)
+
+
+def _passed_over(done: Any, watch: list[Callable[[float, _Vector], float]]) -> tuple[float, int] | None:
+    """The first event that came and went within a step, which the solver does not see: its time, its place in the list."""
+    from scipy.optimize import brentq, minimize_scalar
+
+    first: tuple[float, int] | None = None
+    for which, event in enumerate(watch):
+
+        def value(t: float, event: Callable[[float, _Vector], float] = event) -> float:
+            return event(t, done.sol(t))
+
+        for begin, end in itertools.pairwise(done.t):
+            if first is not None and begin >= first[0]:
+                break
+            grid = np.linspace(begin, end, _WITHIN + 1)
+            seen = [value(t) for t in grid]
+            for i in range(1, _WITHIN):
+                if not (0 < seen[i] <= min(seen[i - 1], seen[i + 1]) or seen[i] <= 0 < seen[i - 1]):
+                    continue
+                low = grid[i]
+                if seen[i] > 0:
+                    around = (float(grid[i - 1]), float(grid[i + 1]))
+                    low = float(minimize_scalar(value, bounds=around, options={"xatol": 1e-12}).x)
+                if value(low) < 0:
+                    at = float(brentq(value, grid[i - 1], low, xtol=1e-15))
+                    first = (at, which) if first is None or at < first[0] else first
+                    break
+    # What the solver found at its end is no other.
+    return first if first is not None and first[0] < done.t[-1] - 1e-12 else None
 
 
 def _started(event: Callable[[float, _Vector], float], begin: float) -> Callable[[float, _Vector], float]:

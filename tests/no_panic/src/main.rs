@@ -583,7 +583,7 @@ fn board() {
         node = opaque(node);
         node.poll(word() as u32, &mut out);
         sink((node.code(), node.state() == BoardState::Running, node.period_us(), node.watchdog_at()));
-        sink(node.is_answered());
+        sink(node.unanswered());
         drain(&mut out);
         if flag() {
             return;
