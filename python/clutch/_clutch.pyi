@@ -188,9 +188,11 @@ class Plant:
         """
         Position in counts to 2⁻¹⁶ of one, as an ideal sensor shows it.
         """
-    def place(self, /, position_rad: SupportsFloat | SupportsIndex, velocity_rad_s: SupportsFloat | SupportsIndex = 0.0) -> None:
+    def place(self, /, position_rad: SupportsFloat | SupportsIndex, velocity_rad_s: SupportsFloat | SupportsIndex = 0.0, voltage_v: SupportsFloat | SupportsIndex | None = None) -> None:
         """
-        Puts the shaft somewhere else: its time, its voltages and what is random go on.
+        Puts the shaft somewhere else: its time and what is random go on.
+
+        Bristles, if its friction has some, bend as in steady sliding, at rest as they have to under the voltage at the pad.
 
         Parameters
         ----------
@@ -198,11 +200,14 @@ class Plant:
             Position of the shaft, rad.
         velocity_rad_s : float, optional
             Its velocity, rad/s; 0 is at rest.
+        voltage_v : float, optional
+            Voltage that the converter has given since long, V; absent: the voltages go on, also those that are still on
+            their way through delay and lag.
 
         Raises
         ------
         ValueError
-            A number that is not finite, or a position beyond the encoder's counts.
+            A number that is not finite, a position beyond the encoder's counts, a voltage beyond the converter's.
         """
     @property
     def position(self, /) -> float:

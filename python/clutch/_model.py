@@ -6,6 +6,7 @@ The tables are in `_tables`, which follows from the declarations in Rust; a scen
 import functools
 import html
 import os
+import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
@@ -244,6 +245,9 @@ class Scenario(_tables._Scenario):
 
 
 def _overrides(origin: str, given: Mapping[str, object]) -> _Tree:
+    if not isinstance(given, Mapping):
+        expected = "a mapping of dotted keys to values, as {'law.smc.kp_v': 4}"
+        raise TypeError(f"overrides = {reprlib.repr(given)}: expected {expected}")
     return {key: _written(origin, key, value) for key, value in given.items()}
 
 

@@ -7,6 +7,7 @@ import inspect
 import json
 import math
 import pickle
+import re
 import tomllib
 
 import numpy as np
@@ -953,6 +954,29 @@ def test_an_override_may_change_an_alternative_and_the_rig_below_all():
     mixed = scenario.override({"rig.delay_ticks": 3, "rig.base": "bench"})
     assert mixed.rig == clutch.Rig.bench().replace(delay_ticks=3)
     assert clutch.Scenario.load("smc_2", {"rig.delay_ticks": 3, "rig.base": "bench"}) == mixed
+
+
+def test_a_motor_that_is_too_weak_is_told_what_takes_most_of_it():
+    motor = clutch.Scenario.load("motor_pid")
+    preload = {"rig.actuator.motor.preload_nm": 20, "model.actuator.motor.preload_nm": 20}
+    with pytest.raises(clutch.ParamError) as dragged:
+        motor.override(preload)
+    assert "lower rig.actuator.motor.preload_nm and model.actuator.motor.preload_nm, raise" in str(dragged.value)
+    assert "hang" not in str(dragged.value) and "accelerate" not in str(dragged.value)
+    hung = {"rig.drive": {"weight": {"mass_kg": 5}}, "model.drive_torque_nm": 1.177}
+    with pytest.raises(clutch.ParamError) as loaded:
+        motor.override(hung)
+    assert "hang less on it" in str(loaded.value) and "preload" not in str(loaded.value)
+    # What it needs at most on its way suffices.
+    most = float(re.search(r"up to (-[0-9.]+) V later, .* lower output.lowest_v and rig.dac.lowest_v", str(loaded.value))[1])
+    motor.override(hung | {"output.lowest_v": most - 0.001, "rig.dac.lowest_v": most - 0.001})
+    with pytest.raises(clutch.ParamError):
+        motor.override(hung | {"output.lowest_v": most + 0.001, "rig.dac.lowest_v": most - 0.001})
+
+
+def test_overrides_that_are_no_mapping_are_refused():
+    with pytest.raises(TypeError, match=r"overrides = 'smc_2': expected a mapping of dotted keys to values"):
+        clutch.Scenario.load("smc_2").override("smc_2")
 
 
 def test_overrides_take_numpys_values():

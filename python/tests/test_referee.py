@@ -81,6 +81,17 @@ def test_an_engine_whose_package_is_missing_is_skipped_with_a_word(monkeypatch):
     assert "mujoco           skipped: mujoco is not installed" in referee.table([CASES["P3"]], results)
 
 
+def test_an_engine_that_gives_no_trajectory_is_told_so():
+    class Five(Tanh):
+        name = "five"
+
+        def run(self, case):
+            return 5
+
+    with pytest.raises(TypeError, match=r"engine five: run\(\) gave 5: expected a clutch\.referee\.Trajectory"):
+        referee.compare([CASES["C1"]], [Five()])
+
+
 def test_an_engine_that_does_not_take_a_case_says_why():
     assert "bristles" in MuJoCo().refuses(CASES["L1"])
     assert "scenario" in MuJoCo().refuses(CASES["A3_pd"])

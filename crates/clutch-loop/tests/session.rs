@@ -10,6 +10,7 @@ use clutch_loop::port::Address;
 use clutch_loop::realtime::RealtimeOptions;
 use clutch_loop::replay;
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
+use clutch_loop::sim_board_server::PATIENCE;
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
@@ -164,6 +165,17 @@ fn a_stop_is_no_fault_and_a_fault_is_no_stop() {
     let (summary, _) = run(&session, &Arc::default(), f64::INFINITY);
     assert_eq!((summary.verdict(), summary.report.cause), (Verdict::Fault, Cause::Board));
     assert_eq!(summary.last_line(), "FAULT: the board sees no encoder; the board is in its safe state");
+}
+
+#[test]
+fn the_simulated_boards_clock_waits_for_no_answer_that_does_not_come() {
+    // Ten times the load that is believed: samples that are not believed are not answered.
+    let heavy = scenario("board_smc_2", &[("rig.drive.weight.mass_kg", "5")]);
+    let session = Session::new(heavy, SessionOptions { uncertified: true, ..options() }).unwrap();
+    let (summary, _) = run(&session, &Arc::default(), f64::INFINITY);
+    assert_eq!(summary.verdict(), Verdict::Fault);
+    let board = summary.board.unwrap();
+    assert!(board.waited < PATIENCE.as_secs_f64(), "{board:?}");
 }
 
 #[test]

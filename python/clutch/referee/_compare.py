@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -82,6 +83,8 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
     ------
     ValueError
         Two cases of one id, or two engines of one name; a trajectory that has not the length of its case.
+    TypeError
+        An engine that gives no trajectory.
     """
     cases, results = list(cases), []
     for what, names in (("case", [c.id for c in cases]), ("engine", [e.name for e in engines])):
@@ -102,6 +105,9 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
                 results.append(Score(case.id, engine.name, failed=str(e), seconds=time.process_time() - begin))
                 continue
             seconds = time.process_time() - begin
+            if not isinstance(trajectory, Trajectory):
+                given = reprlib.repr(trajectory)
+                raise TypeError(f"engine {engine.name}: run() gave {given}: expected a clutch.referee.Trajectory")
             results.append(Score(case.id, engine.name, case.judge(trajectory), seconds))
     return results
 

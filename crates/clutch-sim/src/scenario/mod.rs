@@ -7,6 +7,7 @@ mod cannot_follow;
 pub mod describe;
 mod outside;
 mod params;
+mod path_refusal;
 mod sampled;
 mod schema;
 mod section;
@@ -35,8 +36,8 @@ use clutch_core::law::{Asked, Law, Output, Shell};
 use clutch_core::params::{Choice, Kind, Params, Row};
 use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
-    ActuatorKind, Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, Obstacle, ParamError, Plant, Real,
-    Supervisor, SupervisorParams, VelocitySource, check_path,
+    ActuatorKind, Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, ParamError, Plant, Real, Supervisor,
+    SupervisorParams, VelocitySource, check_path,
 };
 use std::io::ErrorKind;
 use std::path::Path;
@@ -702,56 +703,7 @@ impl Scenario {
         let first = path.at(0).velocity;
         let start_velocity = if p.run.start == Start::OnPath { first } else { 0.0 };
         let envelope = check_path(&path, self.ticks(), period, start_velocity, bounds, limits)
-            .map_err(|e| {
-                let at_time = format!("{} cannot follow the path from t = {:.4} s on", actor(bounds.actuator), e.time);
-                let (asked, available) = (e.asked, e.available);
-                self.path_message(match e.obstacle {
-                    Obstacle::Reverse if bounds.actuator == ActuatorKind::Both => format!(
-                        "{at_time}: it runs backwards at {:.4} °/s, and this motor drives forwards alone; keep the velocity at or above 0",
-                        -asked.to_degrees()
-                    ),
-                    Obstacle::Reverse => format!(
-                        "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0, or give rig and model a motor",
-                        -asked.to_degrees()
-                    ),
-                    Obstacle::Acceleration if available <= 0.0 && p.output.lowest > 0.0 => format!(
-                        "{at_time}: with output.lowest_v = {} the brake never lets go enough for the drive to keep the path; lower it",
-                        p.output.lowest
-                    ),
-                    Obstacle::Acceleration if available <= 0.0 && bounds.preload > 0.0 => format!(
-                        "{at_time}: the disc drags more than the drive gives, which grants {:.5} °/s²; lower model.actuator.{}.preload_nm and the rig's, or give rig.drive and model.drive_torque_nm more torque",
-                        available.to_degrees(),
-                        if bounds.actuator == ActuatorKind::Brake { "brake" } else { "both" }
-                    ),
-                    Obstacle::Acceleration if available <= 0.0 => format!(
-                        "{at_time}: damping takes more than the drive gives, which grants {:.5} °/s²; go more slowly, lower viscous_damping_nm_s_rad of model and rig, or give rig.drive and model.drive_torque_nm more torque",
-                        available.to_degrees()
-                    ),
-                    Obstacle::Acceleration => format!(
-                        "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly, give rig.drive and model.drive_torque_nm more torque, or give rig and model a motor",
-                        asked.to_degrees(),
-                        available.to_degrees()
-                    ),
-                    Obstacle::Voltage if bounds.actuator == ActuatorKind::Motor => format!(
-                        "{at_time}: it needs {asked:.4} V, and output.{} the limit, hang less on it, or take a motor with a higher gain_nm_v",
-                        if asked < 0.0 {
-                            format!("lowest_v = {available}; accelerate more slowly, lower")
-                        } else {
-                            format!("highest_v = {available}; accelerate more slowly, raise")
-                        }
-                    ),
-                    Obstacle::Voltage if asked < 0.0 => format!(
-                        "{at_time}: it needs {asked:.4} V of the motor, and output.lowest_v = {available}; accelerate more slowly, lower the limit, or take a motor with a higher motor_gain_nm_v"
-                    ),
-                    Obstacle::Voltage => format!(
-                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, raise the limit, or take a brake with a higher gain"
-                    ),
-                    Obstacle::Hold => format!(
-                        "{at_time}: at rest it needs {asked:.4} N m, and motor and friction hold {available:.4} N m at the worst corner of [bounds]; raise the limits of the output, hang less on it, or take a motor with a higher gain_nm_v"
-                    ),
-                    Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
-                })
-            })?;
+            .map_err(|e| self.path_refusal(&path, bounds, &e))?;
         let limit = p.rig.speed.speed_limit;
         if envelope.velocity > limit * (1.0 + 1e-9) {
             return Err(self.path_message(format!(
@@ -790,15 +742,6 @@ impl Scenario {
             RunError::Memory(_) => self.message("run.duration_s", e.to_string()),
             RunError::Stopped => self.message("", e.to_string()),
         }
-    }
-}
-
-/// The part that a path asks too much of.
-fn actor(kind: ActuatorKind) -> &'static str {
-    match kind {
-        ActuatorKind::Brake => "a brake",
-        ActuatorKind::Motor => "the motor",
-        ActuatorKind::Both => "a brake with this motor",
     }
 }
 
