@@ -49,15 +49,26 @@ impl Greeting {
         const NOTHING: Cow<'_, [u8]> = Cow::Borrowed(&[]);
         let count = endpoint.read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or(&[]);
+        // The first frame, and whether one of these is whole: bytes that make none are no words.
+        let (mut first, mut spoke) = (None, false);
+        for byte in bytes {
+            if let Some(frame) = self.decoder.push(*byte) {
+                spoke |= frame.is_ok();
+                first = first.or(Some(frame.is_ok()));
+            }
+        }
+        if spoke {
+            endpoint.client_spoke();
+        }
         let held = match &mut self.known {
             Known::Heard => return Ok((Cow::Borrowed(bytes), None)),
             Known::Dismissed => return Ok((NOTHING, None)),
             Known::Unheard(held) => held,
         };
         held.extend_from_slice(bytes);
-        let whole = match bytes.iter().find_map(|byte| self.decoder.push(*byte)) {
+        let whole = match first {
             None if held.len() <= MOST_HELD => return Ok((NOTHING, None)),
-            first => matches!(first, Some(Ok(_))),
+            first => first == Some(true),
         };
         let held = std::mem::take(held);
         if !whole && endpoint.dismiss() {
@@ -66,5 +77,64 @@ impl Greeting {
         }
         self.known = Known::Heard;
         Ok((Cow::Owned(held), None))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::port::{Address, ClientEvent};
+    use crate::realtime::{Readiness, WaitMode};
+    use clutch_node::Outbox;
+    use clutch_wire::{Message, Ping};
+
+    /// A client's bytes, and how often it was heard.
+    #[derive(Default)]
+    struct Line {
+        bytes: Vec<u8>,
+        heard: usize,
+    }
+
+    impl Endpoint for Line {
+        fn service(&mut self) -> io::Result<Option<ClientEvent>> {
+            Ok(None)
+        }
+        fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
+            let count = self.bytes.len().min(buf.len());
+            buf[..count].copy_from_slice(&self.bytes[..count]);
+            self.bytes.drain(..count);
+            Ok(count)
+        }
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+        fn wait(&self, _: u64, _: WaitMode) -> Readiness {
+            Readiness::Timeout
+        }
+        fn address(&self) -> Address {
+            "127.0.0.1:1".parse().unwrap()
+        }
+        fn client_spoke(&mut self) {
+            self.heard += 1;
+        }
+    }
+
+    #[test]
+    fn a_client_that_sends_bytes_and_no_frames_says_nothing() {
+        let mut ping = Outbox::default();
+        clutch_node::Sink::push(&mut ping, &Message::Ping(Ping { run: 1, nonce: 7 }));
+        let (mut line, mut greeting, mut buffer) = (Line::default(), Greeting::new(), [0; 64]);
+        let mut say = |bytes: &[u8]| {
+            line.bytes.extend_from_slice(bytes);
+            let _ = greeting.read(&mut line, &mut buffer).unwrap();
+            line.heard
+        };
+        assert_eq!(say(&[0]), 0);
+        assert_eq!(say(ping.as_bytes()), 1);
+        // A delimiter now and then, noise, a part of a frame.
+        for bytes in [&[0][..], &[0, 0, 3, 9, 9, 0], &ping.as_bytes()[..3], &[0], &[]] {
+            assert_eq!(say(bytes), 1, "{bytes:?}");
+        }
+        assert_eq!(say(ping.as_bytes()), 2);
     }
 }

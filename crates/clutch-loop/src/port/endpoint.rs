@@ -49,4 +49,8 @@ pub trait Endpoint {
     fn dismiss(&mut self) -> bool {
         false
     }
+
+    /// The present client has sent a whole frame. One that sends none for long makes room for another, where a line has
+    /// room for one.
+    fn client_spoke(&mut self) {}
 }

@@ -26,7 +26,7 @@ const REFUSED: usize = 4;
 /// Time that a second client has for reading that it is one, ns.
 const LINGER: u64 = 1_000_000_000;
 
-/// A client that has said nothing for so long makes room for one that wants its place, ns.
+/// A client that has said nothing for so long – bytes that make no frame are nothing – makes room for one that wants its place, ns.
 const IDLE: u64 = 10_000_000_000;
 
 /// The socket that a board listens on.
@@ -42,7 +42,7 @@ enum Socket {
 pub struct Listener {
     socket: Socket,
     client: Option<OwnedFd>,
-    /// The time at which it last said something, or came, ns.
+    /// The time of its last whole frame, or at which it came, ns.
     heard_ns: u64,
     /// The one that takes an idle client's place.
     next: Option<OwnedFd>,
@@ -216,14 +216,12 @@ impl Endpoint for Listener {
                 self.ended = true;
                 Ok(0)
             }
-            Ok(count) => {
-                if count > 0 {
-                    self.heard_ns = monotonic_ns();
-                }
-                Ok(count)
-            }
             other => other,
         }
+    }
+
+    fn client_spoke(&mut self) {
+        self.heard_ns = monotonic_ns();
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
