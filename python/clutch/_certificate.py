@@ -12,8 +12,8 @@ class Certificate(_Record):
 
     A certificate is true as a condition: ``if scenario.certificate(): …``. In it, time is continuous and the sensor
     exact; sampling, encoder steps and delay come on top: `sampled` has what is said of them. With
-    ``scenario.certificate(sampled=True)`` it is true if the error of the sampled loop has a proven bound. docs/theory.md,
-    section 8, derives both.
+    ``scenario.certificate(sampled=True)`` it is true if the error of the sampled loop has a proven bound.
+    docs/theory.md, section 8, derives both.
 
     Parameters
     ----------
@@ -330,8 +330,8 @@ class Certificate(_Record):
     def __bool__(self) -> bool:
         """True if the gains are certified as it was asked.
 
-        In continuous time, and the sampled loop is not known to be unstable; with ``sampled=True`` or ``check`` a bound of
-        the sampled loop is proven, and it is linearly stable or within a shell.
+        In continuous time, and the sampled loop is not known to be unstable; with ``sampled=True`` or ``check`` a bound
+        of the sampled loop is proven, and it is linearly stable or within a shell.
         """
         sampled = self.sampled
         if sampled.looked_for:

@@ -179,10 +179,10 @@ class Scenario(_tables._Scenario):
             Look for a proof that bounds the error of the sampled loop as well: seconds to minutes on one core. Ctrl-C
             returns at once; the search goes on in a thread of its own until it has ended, and is dropped.
         save
-            Write that proof to this file, JSON, which `check`, ``clutch certify --check`` and ``clutch.loop(certificate=…)``
-            read. Nothing is written where nothing is proven.
+            Write that proof to this file, JSON, which `check`, ``clutch certify --check`` and
+            ``clutch.loop(certificate=…)`` read. Nothing is written where nothing is proven.
         check
-            Check the proof in this file, and that it is this scenario's, instead of looking for one: well below a second.
+            Check the proof in this file, and that it is this scenario's, instead of looking for one: a moment.
 
         Returns
         -------

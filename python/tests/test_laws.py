@@ -163,7 +163,7 @@ def test_a_plant_is_put_somewhere_else():
     for bad in [{"position_rad": math.nan}, {"position_rad": 1e9}, {"position_rad": 0.0, "velocity_rad_s": math.inf}]:
         with pytest.raises(ValueError, match=rf"^{next(reversed(bad))} = .*: expected a finite"):
             plant.place(**bad)
-    with pytest.raises(ValueError, match="voltage_v = 1.1e1: expected a voltage of the converter, -10 to 10 V"):
+    with pytest.raises(ValueError, match=r"voltage_v = 1\.1e1: expected a voltage of the converter, -10 to 10 V"):
         plant.place(0.0, voltage_v=11)
 
 

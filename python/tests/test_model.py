@@ -968,7 +968,9 @@ def test_a_motor_that_is_too_weak_is_told_what_takes_most_of_it():
         motor.override(hung)
     assert "hang less on it" in str(loaded.value) and "preload" not in str(loaded.value)
     # What it needs at most on its way suffices.
-    most = float(re.search(r"up to (-[0-9.]+) V later, .* lower output.lowest_v and rig.dac.lowest_v", str(loaded.value))[1])
+    most = float(
+        re.search(r"up to (-[0-9.]+) V later, .* lower output.lowest_v and rig.dac.lowest_v", str(loaded.value))[1]
+    )
     motor.override(hung | {"output.lowest_v": most - 0.001, "rig.dac.lowest_v": most - 0.001})
     with pytest.raises(clutch.ParamError):
         motor.override(hung | {"output.lowest_v": most + 0.001, "rig.dac.lowest_v": most - 0.001})

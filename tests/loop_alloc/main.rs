@@ -98,7 +98,13 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let address = terminal.address();
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, rig) = (stop.clone(), scenario.clone());
-    let options = ServeOptions { faults: Vec::new(), seed: 1, patient: true, wait: WaitMode::Sleep };
+    let options = ServeOptions {
+        faults: Vec::new(),
+        seed: 1,
+        patient: true,
+        wait: WaitMode::Sleep,
+        passed: Arc::default(),
+    };
     let board =
         std::thread::spawn(move || sim_board_server::serve(&rig, &options, &mut terminal, &flag, |_| ()));
 

@@ -176,6 +176,6 @@ fn with_another_start(spec: &RunSpec<'_>) -> Run {
     let mut moved = spec.prepare().unwrap();
     let shaft = *moved.moving.shaft();
     moved.moving = moved.moving.by(DormandPrince::with_tolerance(TIGHT));
-    moved.moving.place(shaft.position, shaft.velocity * (1.0 + 1e-14));
+    moved.moving.place(shaft.position, shaft.velocity * (1.0 + 1e-14), None);
     simulate_prepared(spec, &servo, moved, Keep::Trace, UNWATCHED).unwrap()
 }

@@ -550,7 +550,8 @@ impl Plant {
         };
         let rig = self.moving.rig();
         let per_radian: f64 = rig.encoder.counts_per_radian();
-        if !((position_rad * per_radian).abs() < f64::from(i32::MAX)) {
+        let counted = (position_rad * per_radian).abs() < f64::from(i32::MAX);
+        if !counted {
             return refused("position_rad", position_rad, "a finite position within ±2³¹ counts".to_owned());
         }
         if !velocity_rad_s.is_finite() {

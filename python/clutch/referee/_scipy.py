@@ -378,7 +378,7 @@ class _Rigid:
 
 
 def _passed_over(done: Any, watch: list[Callable[[float, _Vector], float]]) -> tuple[float, int] | None:
-    """The first event that came and went within a step, which the solver does not see: its time, its place in the list."""
+    """Time, and place in the list, of the first event that came and went within a step: the solver sees none."""
     from scipy.optimize import brentq, minimize_scalar
 
     first: tuple[float, int] | None = None
