@@ -188,6 +188,7 @@ mod tests {
             assert_eq!(s.ticks(), k + 1);
         }
         assert!(s.stuck());
+        assert_eq!(s.silent_ticks(), 999, "the first sample is no silence");
         for k in 0..100 {
             d.update(&mut s, Counts(5 + k), 10.0_f64.to_radians());
         }

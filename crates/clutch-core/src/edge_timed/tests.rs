@@ -281,3 +281,19 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn an_encoder_has_the_waves_that_it_sees_or_those_of_the_default() {
+    let default = EdgeTimedParams::<f64>::default().waves;
+    assert_eq!(waves_for(20_000), default);
+    for counts in [50, 500, 800] {
+        let params = EdgeTimedParams { waves: waves_for(counts), ..EdgeTimedParams::default() };
+        let encoder = Encoder::new::<f64>(counts).unwrap();
+        assert!(
+            params.waves < default && EdgeTimed::new(&params, &plant(), encoder, PERIOD).is_ok(),
+            "{counts}"
+        );
+        let more = EdgeTimedParams { waves: 1.02 * params.waves, ..params };
+        assert!(EdgeTimed::new(&more, &plant(), encoder, PERIOD).is_err(), "{counts}");
+    }
+}

@@ -218,3 +218,27 @@ impl<T: Real> Listed<T> for Ctc<T> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ActuatorParams, CoulombParams, FrictionParams};
+
+    #[test]
+    fn a_friction_without_a_curve_is_inverted_by_its_level() {
+        let friction =
+            FrictionParams::from(CoulombParams { mu_static: 0.3, mu_dynamic: 0.25, ..CoulombParams::default() });
+        let model = PlantParams { friction, actuator: ActuatorParams::brake(0.2), ..PlantParams::default() };
+        let law =
+            Ctc::new(&CtcParams::default(), &model, &OutputParams::default(), Micros(1000)).unwrap();
+        // Coulomb's level is one of sliding, at rest, too.
+        for (rate, mu) in [(0.5, 0.25), (0.0, 0.25)] {
+            let tick = Tick { target_velocity: rate, ..Tick::default() };
+            let command = law.update(&mut law.start(&tick, 0.0), &tick);
+            // (11) without an error: drive less damping, over friction and gain.
+            let volts = (model.drive_torque - model.viscous_damping * rate) / (mu * 0.2);
+            assert!((command.terms[2] - mu).abs() < 1e-15, "{:?}", command.terms);
+            assert!((command.voltage - volts).abs() < 1e-12, "{} V, {volts} V", command.voltage);
+        }
+    }
+}

@@ -655,3 +655,10 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_target_in_single_precision_keeps_its_position_whole() {
+    let target = Target { position: FixedCounts((1 << 40) + 1), velocity: 0.1_f64, acceleration: -1e-3 };
+    let single: Target<f32> = target.cast();
+    assert_eq!((single.position, single.velocity, single.acceleration), (target.position, 0.1, -1e-3));
+}
