@@ -310,6 +310,12 @@ fn what_a_case_cannot_pose_is_refused_by_its_name() {
             "joints = [1.0]\nreaction_of = [1]",
             "mechanism.row[0].reaction_of: cannot be posed: a normal force",
         ),
+        (
+            row,
+            "joints = [0.0]",
+            "mechanism.row[0].joints: 0 of each joint: expected a row that one of them moves",
+        ),
+        (row, "joints = [1.0, 2.0]", "mechanism.row[0].joints = [1.0, 2.0]: expected 1 finite numbers"),
         ("constant = 1.0", "of = 1", "mechanism.row[0].normal[0].of: cannot be posed: a normal force"),
         (row, "joints = [1.0]\nrestitution = 0.5", "mechanism.row[0].restitution: cannot be posed: impacts"),
         ("inertia =", "backlash = 0.01\ninertia =", "mechanism.backlash: cannot be posed: backlash"),

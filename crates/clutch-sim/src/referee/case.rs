@@ -304,7 +304,15 @@ fn mechanism(origin: &str, file: MechanismFile) -> Result<Mechanism, CaseError> 
     for (i, row) in file.row.into_iter().enumerate() {
         let at = format!("mechanism.row[{i}]");
         if row.joints.len() != n || row.joints.iter().any(|x| !x.is_finite()) {
-            return Err(wrong(format!("{at}.joints: expected {n} finite numbers, one for each joint")));
+            let joints = &row.joints;
+            return Err(wrong(format!(
+                "{at}.joints = {joints:?}: expected {n} finite numbers, one for each joint"
+            )));
+        }
+        if row.joints.iter().all(|x| *x == 0.0) {
+            return Err(wrong(format!(
+                "{at}.joints: 0 of each joint: expected a row that one of them moves"
+            )));
         }
         if !row.base_velocity.is_finite() {
             return Err(wrong(format!(
