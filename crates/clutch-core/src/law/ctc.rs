@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn a_friction_without_a_curve_is_inverted_by_its_level() {
         let friction =
-            FrictionParams::from(CoulombParams { mu_static: 0.3, mu_dynamic: 0.25, ..CoulombParams::default() });
+            FrictionParams::from(CoulombParams { mu_static: 0.3, mu_dynamic: 0.25 });
         let model = PlantParams { friction, actuator: ActuatorParams::brake(0.2), ..PlantParams::default() };
         let law =
             Ctc::new(&CtcParams::default(), &model, &OutputParams::default(), Micros(1000)).unwrap();
