@@ -224,7 +224,10 @@ class _Lines:
             last, length, rows = line, length + len(line), rows + 1
         if rows < 0:
             raise ValueError(f"{self._path}: has no header of a sweep; name another file")
-        if rows > 0 and run(range(rows - 1, rows)) != [last]:
+        again = run(range(rows - 1, rows)) if rows > 0 else [last]
+        if not again:
+            raise KeyboardInterrupt
+        if again != [last]:
             raise ValueError(
                 f"{self._path}: its row {rows - 1} is not what this sweep gives: it is of another scenario or another "
                 "version of clutch; name another file"
@@ -252,6 +255,12 @@ def _to_parquet(lines: Path, out: Path, chosen: Samples, metrics: Sequence[str])
     names = [*chosen.keys, *metrics, "error"]
     schema = pyarrow.schema([pyarrow.field(name, kinds[name], metadata=attributes(name)) for name in names])
     options = reader.ConvertOptions(column_types=kinds, strings_can_be_null=False)
-    with reader.open_csv(lines, convert_options=options) as parts, parquet.ParquetWriter(out, schema) as file:
-        for part in parts:
-            file.write_batch(part.cast(schema))
+    part = out.with_name(f"{out.name}.part")
+    try:
+        with reader.open_csv(lines, convert_options=options) as parts, parquet.ParquetWriter(part, schema) as file:
+            for some in parts:
+                file.write_batch(some.cast(schema))
+        # It has its name once it is whole: until then the lines are what there is, and go on.
+        part.replace(out)
+    finally:
+        part.unlink(missing_ok=True)

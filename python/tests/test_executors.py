@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 
+import numpy as np
 import pytest
 
 import clutch
@@ -69,6 +70,22 @@ def test_a_native_sweep_in_a_forked_child_does_not_hang(base, local):
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
         future = pool.submit(clutch.sweep, base, SAMPLES, **OPTIONS)
         same(local, future.result(timeout=30))
+
+
+def _steps():
+    from clutch.gym import TrackingVectorEnv
+
+    envs = TrackingVectorEnv(600, scenario="pd_2")
+    envs.reset(seed=1)
+    return float(envs.step(np.zeros(envs.action_space.shape, envs.action_space.dtype))[1].sum())
+
+
+def test_shafts_in_a_forked_child_do_not_hang():
+    pytest.importorskip("gymnasium")
+    here = _steps()
+    context = multiprocessing.get_context("fork")
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
+        assert pool.submit(_steps).result(timeout=60) == here
 
 
 class Counting:

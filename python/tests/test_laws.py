@@ -176,10 +176,24 @@ def test_a_plant_that_is_put_somewhere_with_a_voltage_has_forgotten_what_was_bef
             for _ in range(100):
                 plant.step(before)
             plant.place(0.0, voltage_v=3.0)
+            assert plant.voltage == 3.0
             for _ in range(100):
                 plant.step(2.0)
             ends.add((plant.position, plant.velocity))
         assert len(ends) == 1, rig
+
+
+def test_bristles_of_a_plant_that_is_put_somewhere_hold_what_pulls_there():
+    # A spring pulls the more the farther behind the shaft is, and the disc's friction changes along it.
+    spring = {"rig.drive": {"spring": {"stiffness_nm_rad": 0.05, "rest_deg": 57.3}}, "rig.friction": {"lugre": {}}}
+    plant = clutch.Plant(clutch.Scenario.load("pd_2").override(spring))
+    rippled = clutch.Plant(clutch.Scenario.load("bench_pd_2").override({"rig.friction": {"lugre": {}}}))
+    for p, angles in [(plant, [0.0, 0.4, -0.5]), (rippled, [0.1, 0.9, 2.3])]:
+        for angle in angles:
+            p.place(angle, voltage_v=9.0)
+            p.step(9.0)
+            assert abs(p.position - angle) < 1e-8, angle
+            assert abs(p.velocity) < 1e-5, angle
 
 
 def test_a_spoilt_pickle_is_refused():

@@ -1,8 +1,12 @@
 """Identification and tuning from Python: the command's figures, refusals, pictures."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 
 import matplotlib.pyplot as plt
 import pytest
@@ -158,3 +162,19 @@ def test_without_a_certificate_nothing_is_given_out():
         _ = tuned.scenario
     with pytest.raises(ValueError, match="nothing is proven"):
         tuned.save_proof("never.json")
+
+
+def test_ctrl_c_ends_a_search_for_gains_or_for_a_proof_at_once(tmp_path):
+    saved = tmp_path / "proof.json"
+    wide = clutch.Scenario.load("pd_2").override({"bounds.friction_percent": 40})
+    for work in [
+        lambda: clutch.tune("board_smc_2", candidates=3000),
+        lambda: wide.certificate(sampled=True, save=saved),
+    ]:
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        begun = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        # Alone they take many times as long.
+        assert time.monotonic() - begun < 5
+    assert not saved.exists()

@@ -6,15 +6,16 @@ pub use crate::sampled::Asked;
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
+use clutch_certificate::file;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::params::{
     DEG, DEG_S, DEG_S2, KG_M2, NM, NM_S_RAD, NM_V, NONE, PER_S, PERCENT, RAD_S, RAD_S2, Unit, V, V_S_RAD,
 };
 use clutch_core::{ActuatorKind, Bounds, Interval};
-use clutch_sim::scenario::{Plan, Sampled};
+use clutch_sim::scenario::{CertificateError, Plan, Sampled};
 use clutch_sim::{Scenario, ScenarioError};
 use serde_json::{Value, json as value};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Checks a scenario's gains against every plant within its bounds.
 ///
@@ -46,28 +47,29 @@ impl Certify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let asked = match (self.check, self.sampled) {
             (Some(file), _) => Asked::Check(file),
-            (None, true) => Asked::Search(self.save),
+            (None, true) => Asked::Search,
             (None, false) => Asked::Nothing,
         };
-        check_proof_file(&asked)?;
+        let save = self.save;
+        check_files(&save)?;
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let rig =
             scenario.cannot_follow()?.map_or(String::new(), |reason| paragraph(&format!("note: {reason}")));
         let sampled = scenario.sampled(&plan.bounds);
-        let bound = Bound::of(&sampled, &asked)?;
-        let file = match &asked {
-            Asked::Search(Some(file)) => Some(file.as_path()),
-            _ => None,
-        };
-        let saved: Vec<&Path> = file.into_iter().filter(|_| bound.proven().is_some()).collect();
+        let (bound, proof) = Bound::of(&sampled, &asked)?;
+        let mut saved = Vec::new();
+        if let (Some(file), Some(proof)) = (save.as_deref(), &proof) {
+            file::write(file, proof).map_err(CertificateError::from)?;
+            saved.push(file);
+        }
         report(
             self.json,
             || json(&whole(&scenario, &sampled, &bound)?),
             || text(&scenario, &plan, &outside) + &rig + &sampled::lines(&sampled, &bound) + &wrote(&saved),
         )?;
-        if let (Some(file), None) = (file, bound.proven()) {
+        if let (Some(file), None) = (&save, &proof) {
             eprintln!("{}: not written: nothing is proven", file.display());
         }
         let certified = match bound {
@@ -287,24 +289,26 @@ fn printed(p: &PaperConditions) -> String {
     )
 }
 
-/// Refuses a file that cannot be written before a proof is looked for.
-fn check_proof_file(asked: &Asked) -> anyhow::Result<()> {
-    match asked {
-        Asked::Search(file) => check_files(file),
-        _ => Ok(()),
-    }
-}
-
-/// A scenario's certificate: the object that `--json` prints, described in `docs/scenario.md`.
+/// Refuses a file for a proof that cannot be written, before one is looked for.
 ///
 /// # Errors
-/// A path that a brake cannot follow; a file that cannot be written, or proves nothing for this scenario.
-pub fn certificate(scenario: &Scenario, asked: &Asked) -> anyhow::Result<Value> {
-    check_proof_file(asked)?;
+/// A folder that is not there, a file that is one or is read-only.
+pub fn check_save(file: &PathBuf) -> anyhow::Result<()> {
+    check_files([file])
+}
+
+/// A scenario's certificate: the object that `--json` prints, described in `docs/scenario.md`, and the proof that was found.
+///
+/// # Errors
+/// A path that a brake cannot follow; a file that proves nothing for this scenario.
+pub fn certificate(
+    scenario: &Scenario,
+    asked: &Asked,
+) -> anyhow::Result<(Value, Option<clutch_certificate::Certificate>)> {
     let plan = scenario.plan()?;
     let sampled = scenario.sampled(&plan.bounds);
-    let bound = Bound::of(&sampled, asked)?;
-    Ok(whole(scenario, &sampled, &bound)?)
+    let (bound, proof) = Bound::of(&sampled, asked)?;
+    Ok((whole(scenario, &sampled, &bound)?, proof))
 }
 
 fn whole(scenario: &Scenario, sampled: &Sampled, bound: &Bound) -> Result<Value, ScenarioError> {

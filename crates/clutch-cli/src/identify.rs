@@ -130,30 +130,28 @@ impl Identify {
         };
         let report = Identified::of(&recordings)?;
         let separate = self.separate(&report, &scenario)?;
-        let file = self.out.as_deref().map(|path| (path, report.rig_file(&scenario)));
         output::report(
             self.json,
             || json(&object(&report, separate.as_ref())),
             || text(&report) + &separate.as_ref().map_or_else(String::new, one_by_one),
         )?;
-        if let Some((path, file)) = file {
-            write(path, file?)?;
-        }
-        if let Some(path) = &self.map {
-            let believed = || map_as_believed(&recordings, &scenario);
-            let map = if report.map().is_empty() { believed() } else { report.map().to_vec() };
-            if map.is_empty() {
-                bail!(
-                    "{}: not written: no ride at an even rate was found; docs/identify.md says what is one",
-                    path.display()
-                );
+        // One that cannot be made does not cost the other.
+        let rig = self.out.as_deref().map(|path| (path, report.rig_file(&scenario).map_err(Into::into)));
+        let map = self.map.as_deref().map(|path| (path, friction_map(path, &report, &recordings, &scenario)));
+        let (mut written, mut lacks) = (Vec::new(), Ok(()));
+        for (path, file) in rig.into_iter().chain(map) {
+            match file {
+                Ok(file) => {
+                    write(path, file)?;
+                    written.push(path);
+                }
+                Err(why) => lacks = lacks.and(Err(why)),
             }
-            write(path, map_file(&map, scenario.name()))?;
         }
         if !self.json {
-            let files = [&self.out, &self.map].into_iter().flatten();
-            tell(&wrote(&files.map(PathBuf::as_path).collect::<Vec<_>>()))?;
+            tell(&wrote(&written))?;
         }
+        lacks?;
         let told = report.shown().iter().any(|row| row.finding.known().is_some());
         Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
     }
@@ -275,6 +273,24 @@ impl Identify {
         let log = clutch_log::read(file, &Limits::default())?;
         Ok(Recording::from_log(&name, &log)?)
     }
+}
+
+/// The file of the friction along the disc, as it was found or as the law believed it to be.
+fn friction_map(
+    path: &Path,
+    report: &Identified,
+    recordings: &[Recording],
+    scenario: &Scenario,
+) -> anyhow::Result<String> {
+    let believed = || map_as_believed(recordings, scenario);
+    let map = if report.map().is_empty() { believed() } else { report.map().to_vec() };
+    if map.is_empty() {
+        bail!(
+            "{}: not written: no ride at an even rate was found; docs/identify.md says what is one",
+            path.display()
+        );
+    }
+    Ok(map_file(&map, scenario.name()))
 }
 
 fn text(report: &Identified) -> String {

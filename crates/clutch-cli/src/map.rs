@@ -54,6 +54,23 @@ pub(crate) struct List(pub(crate) Vec<f64>);
 /// More values than anybody waits for.
 const MOST: usize = 1000;
 
+/// Evenly spaced values, in ratio from above 0, else in difference; the ends as they are given, those between with as few
+/// digits, four or more, as keep them apart: what is typed again is what was run.
+fn spread(low: f64, high: f64, n: usize) -> Vec<f64> {
+    let value = |i: usize, digits: usize| {
+        let share = i as f64 / (n - 1) as f64;
+        let x = if low > 0.0 { low * (high / low).powf(share) } else { low + (high - low) * share };
+        match i {
+            0 => low,
+            _ if i == n - 1 => high,
+            _ => format!("{x:.digits$e}").parse().unwrap_or(x),
+        }
+    };
+    let with = |digits: usize| (0..n).map(|i| value(i, digits)).collect::<Vec<f64>>();
+    let apart = |list: &Vec<f64>| list.windows(2).all(|pair| pair[0] < pair[1]);
+    (3..17).map(with).find(apart).unwrap_or_else(|| with(17))
+}
+
 pub(crate) fn values(text: &str) -> Result<List, String> {
     let expected = "expected LOW:HIGH:NUMBER, as 500:5000:8, or a list, as 5,10,20";
     let wrong = |what: &str| format!("{text}: {what}");
@@ -65,12 +82,7 @@ pub(crate) fn values(text: &str) -> Result<List, String> {
             if !(low.is_finite() && high > low && high.is_finite() && (2..=MOST).contains(&n)) {
                 return Err(wrong(&format!("expected LOW < HIGH and 2 to {MOST} values")));
             }
-            let share = |i: usize| i as f64 / (n - 1) as f64;
-            let step = |i: usize| {
-                if low > 0.0 { low * (high / low).powf(share(i)) } else { low + (high - low) * share(i) }
-            };
-            // Four digits: what is typed again is what was run.
-            (0..n).map(|i| format!("{:.3e}", step(i)).parse().unwrap_or(f64::NAN)).collect()
+            spread(low, high, n)
         }
         [list] => list.split(',').map(read).collect::<Result<Vec<_>, _>>()?,
         _ => return Err(wrong(expected)),

@@ -1,7 +1,7 @@
 //! Verdicts on the sampled loop: the error bound, linear stability, sticks; each with its scope.
 
 use crate::output::paragraph;
-use clutch_certificate::file;
+use clutch_certificate::Certificate;
 use clutch_sim::scenario::{CertificateError, Proven, STICKS, Sampled, Unproven};
 use serde_json::{Value, json as value};
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 pub enum Asked {
     /// None.
     Nothing,
-    /// A proof is looked for, and written to a file if one is named.
-    Search(Option<PathBuf>),
+    /// A proof is looked for.
+    Search,
     /// The proof in a file is checked.
     Check(PathBuf),
 }
@@ -32,27 +32,25 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
-    pub(crate) fn of(sampled: &Sampled, asked: &Asked) -> anyhow::Result<Bound> {
+    /// The verdict, and the proof that was found.
+    pub(crate) fn of(sampled: &Sampled, asked: &Asked) -> anyhow::Result<(Bound, Option<Certificate>)> {
         match asked {
-            Asked::Nothing => Ok(Bound::NotLookedFor),
-            Asked::Search(save) => Bound::search(sampled, save.as_deref()),
-            Asked::Check(file) => Bound::of_file(sampled, file),
+            Asked::Nothing => Ok((Bound::NotLookedFor, None)),
+            Asked::Search => Bound::search(sampled),
+            Asked::Check(file) => Ok((Bound::of_file(sampled, file)?, None)),
         }
     }
 
-    /// Looks for a proof, checks it, and saves it if asked.
-    fn search(sampled: &Sampled, save: Option<&Path>) -> anyhow::Result<Bound> {
-        let (proven, certificate) = match sampled.prove() {
-            Ok(found) => found,
-            Err(Unproven::NotCovered(why)) => return Ok(Bound::NotCovered(why.to_string())),
-            Err(Unproven::Unstable) => return Ok(Bound::Unstable),
-            Err(Unproven::Open(cell)) => return Ok(Bound::Open(cell)),
+    /// Looks for a proof, and checks it.
+    fn search(sampled: &Sampled) -> anyhow::Result<(Bound, Option<Certificate>)> {
+        let without = match sampled.prove() {
+            Ok((proven, certificate)) => return Ok((Bound::Proven(proven), Some(certificate))),
+            Err(Unproven::NotCovered(why)) => Bound::NotCovered(why.to_string()),
+            Err(Unproven::Unstable) => Bound::Unstable,
+            Err(Unproven::Open(cell)) => Bound::Open(cell),
             Err(defect @ Unproven::Refused(_)) => return Err(defect.into()),
         };
-        if let Some(path) = save {
-            file::write(path, &certificate).map_err(CertificateError::from)?;
-        }
-        Ok(Bound::Proven(proven))
+        Ok((without, None))
     }
 
     /// Checks the proof of a file, and that it is this scenario's.

@@ -2,12 +2,13 @@
 
 use crate::view::{Frame, Note, Opening, View};
 use clutch_core::supervisor::Cause;
-use clutch_core::{Counts, Encoder};
+use clutch_core::{ActuatorKind, Counts, Encoder};
 use clutch_log::{
     ChangeRecord, CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record,
     SampleRecord, names,
 };
 use clutch_loop::cause_words::cause_text;
+use clutch_loop::drift::label;
 use clutch_loop::live_gains::LiveGains;
 use clutch_sim::detected::Detector;
 use clutch_sim::{Keep, Scenario, number};
@@ -62,6 +63,7 @@ pub(crate) fn start(
 struct Feed {
     /// Keys of the run's parameters.
     keys: Vec<String>,
+    actuator: ActuatorKind,
     encoder: Encoder,
     detector: Detector,
     /// The sampling period, s: time is the run's, which a board's clock that waits does not tear.
@@ -92,6 +94,7 @@ impl Feed {
         let (settle, lately) = (spec.run.settle, VecDeque::new());
         Some(Feed {
             keys,
+            actuator: spec.model.actuator.kind(),
             encoder,
             detector,
             period,
@@ -196,7 +199,7 @@ impl Feed {
             Some(EventKind::PortLost) => ("the port is gone".to_owned(), true),
             Some(EventKind::Drift) => {
                 let seen = number(event.value);
-                (format!("friction over load is {seen} times the model's: outside of [bounds]"), true)
+                (format!("{} is {seen} times the model's: outside of [bounds]", label(self.actuator)), true)
             }
             None => (format!("event {}", event.kind), true),
         };

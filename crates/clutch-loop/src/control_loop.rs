@@ -456,9 +456,9 @@ impl<'a, S: Station> Control<'a, S> {
             };
             self.push(&records[..used]);
             self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
-            if n.cycle.answer.is_none() {
-                self.watch.passed.store(u32::from(n.sample.sequence) + 1, Ordering::Relaxed);
-            }
+            // Until the next sample: numbers come again.
+            let passed = if n.cycle.answer.is_none() { u32::from(n.sample.sequence) + 1 } else { 0 };
+            self.watch.passed.store(passed, Ordering::Relaxed);
             if S::LOOKS_ON {
                 self.on_the_board(n);
             }

@@ -128,14 +128,20 @@ pub struct DriftReport {
     pub has_friction: bool,
 }
 
+/// Name of the quantity that drifts, with an actuator.
+#[must_use]
+pub fn label(actuator: ActuatorKind) -> &'static str {
+    match actuator {
+        ActuatorKind::Brake => "friction over load",
+        ActuatorKind::Motor | ActuatorKind::Both => "friction, with drive and motor as in the model",
+    }
+}
+
 impl DriftReport {
     /// Name of the quantity.
     #[must_use]
     pub fn label(&self) -> &'static str {
-        match self.actuator {
-            ActuatorKind::Brake => "friction over load",
-            ActuatorKind::Motor | ActuatorKind::Both => "friction, with drive and motor as in the model",
-        }
+        label(self.actuator)
     }
 
     /// The figures in words, or why there are none.
@@ -169,7 +175,7 @@ impl DriftReport {
     #[must_use]
     pub fn alarm_words(&self, alarm: &Alarm) -> String {
         let seen = &alarm.seen;
-        let (way, bound) = if seen.least > seen.high { ("above", seen.high) } else { ("below", seen.low) };
+        let (way, bound) = if seen.above() { ("above", seen.high) } else { ("below", seen.low) };
         format!(
             "DRIFT at {} s: {} is {} of the model's ({}), {way} the bound of {}",
             number(alarm.tick as f64 * self.period),

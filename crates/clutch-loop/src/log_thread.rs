@@ -29,7 +29,8 @@ impl LogThread {
     pub fn start(path: &Path, header: &Header, watch: Arc<Watch>) -> Result<(LogThread, Ring), LogError> {
         let mut writer = LogWriter::create(path, header)?;
         let (producer, mut consumer) = rtrb::RingBuffer::<Record>::new(RING);
-        let thread = std::thread::spawn(move || {
+        let thread = std::thread::Builder::new().name("clutch-log".to_owned());
+        let thread = thread.spawn(move || {
             let mut failed = None;
             let mut flushed = Instant::now();
             loop {
@@ -61,7 +62,20 @@ impl LogThread {
                 None => writer.finish(),
             }
         });
+        let thread = thread.map_err(|source| LogError::Io {
+            path: path.into(),
+            action: "cannot start its thread",
+            source,
+        })?;
         Ok((LogThread { path: path.to_owned(), thread }, producer))
+    }
+
+    /// Ends the log of a run that never began, and removes its file; the ring has to be gone.
+    pub fn discard(self) {
+        let path = self.path.clone();
+        // What it says of its end is of no use any more.
+        let _ = self.finish();
+        let _ = std::fs::remove_file(path);
     }
 
     /// Waits until everything is in the file.

@@ -402,6 +402,20 @@ struct Logging {
     watch: Arc<Watch>,
 }
 
+impl Logging {
+    /// The log with what a board has said that is ready; of a run that it refused nothing stays.
+    fn of_a_run<T, E>(self, ready: Result<T, E>) -> Result<(Logging, T), E> {
+        match ready {
+            Ok(ready) => Ok((self, ready)),
+            Err(why) => {
+                drop((self.ring, self.shown));
+                self.thread.into_iter().for_each(LogThread::discard);
+                Err(why)
+            }
+        }
+    }
+}
+
 /// The receivers of a run's records: none in a release test.
 #[derive(Clone, Copy, Default)]
 struct Receivers<'a> {
@@ -454,8 +468,8 @@ impl Course<'_> {
         let log = self.log(&built, present, &board_text(hello), receivers, gains)?;
         let judged = self.has_a_clock(hello, port);
         let mut talk = Talk::new(port, &mut station);
-        talk.configure(present)?;
-        let clock = talk.clock(judged.then_some(built.servo.period()))?;
+        let ready = talk.configure(present).and_then(|()| talk.clock(judged.then_some(built.servo.period())));
+        let (log, clock) = log.of_a_run(ready)?;
         let configured = ConfiguredRun {
             station: &mut station,
             port,
@@ -515,9 +529,11 @@ impl Course<'_> {
         let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
         let judged = self.has_a_clock(hello, port);
         let mut talk = Talk::new(port, &mut station);
-        talk.upload(&settings)?;
-        talk.configure(hold)?;
-        let clock = talk.clock(judged.then_some(built.servo.period()))?;
+        let ready = talk
+            .upload(&settings)
+            .and_then(|()| talk.configure(hold))
+            .and_then(|()| talk.clock(judged.then_some(built.servo.period())));
+        let (log, clock) = log.of_a_run(ready)?;
         let configured = ConfiguredRun {
             station: &mut station,
             port,

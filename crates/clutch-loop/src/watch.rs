@@ -2,7 +2,7 @@
 
 use crate::drift::{Alarm, Seen};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering, fence};
 
 /// The values that a watcher sees while the loop runs.
 #[derive(Debug, Default)]
@@ -34,6 +34,7 @@ pub struct Watch {
 /// An alarm of drift from one thread for another.
 #[derive(Debug, Default)]
 pub struct SharedAlarm {
+    /// Two for each alarm.
     shown: AtomicU64,
     /// Tick and figures of the last one, as bits.
     bits: [AtomicU64; 6],
@@ -44,16 +45,25 @@ impl SharedAlarm {
     pub fn show(&self, alarm: &Alarm) {
         let Seen { friction, least, most, low, high } = alarm.seen;
         let bits = [alarm.tick].into_iter().chain([friction, least, most, low, high].map(f64::to_bits));
+        self.shown.fetch_add(1, Ordering::Relaxed);
+        fence(Ordering::Release);
         self.bits.iter().zip(bits).for_each(|(to, bits)| to.store(bits, Ordering::Relaxed));
         self.shown.fetch_add(1, Ordering::Release);
     }
 
-    /// The number of alarms so far, and the last of them. Alarms are seconds apart.
+    /// The number of alarms so far, and the last of them.
     #[must_use]
     pub fn last(&self) -> (u64, Alarm) {
-        let number = self.shown.load(Ordering::Acquire);
-        let [tick, bits @ ..] = self.bits.each_ref().map(|bits| bits.load(Ordering::Relaxed));
-        let [friction, least, most, low, high] = bits.map(f64::from_bits);
-        (number, Alarm { tick, seen: Seen { friction, least, most, low, high } })
+        loop {
+            let number = self.shown.load(Ordering::Acquire);
+            let [tick, bits @ ..] = self.bits.each_ref().map(|bits| bits.load(Ordering::Relaxed));
+            let [friction, least, most, low, high] = bits.map(f64::from_bits);
+            fence(Ordering::Acquire);
+            // Odd while one is written.
+            if number.is_multiple_of(2) && self.shown.load(Ordering::Relaxed) == number {
+                return (number / 2, Alarm { tick, seen: Seen { friction, least, most, low, high } });
+            }
+            std::hint::spin_loop();
+        }
     }
 }

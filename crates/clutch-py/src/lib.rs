@@ -2,6 +2,7 @@
 //!
 //! `python/clutch` is the public package; it exports parts of this module as `clutch.…`.
 
+mod background;
 mod convert;
 mod log;
 mod paper;

@@ -1,5 +1,6 @@
 //! The paper, reproduced.
 
+use crate::background::in_background;
 use crate::convert::from_json;
 use crate::table::{Column, Table};
 use clutch_sim::paper::{FigureData, Outcome};
@@ -8,7 +9,6 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
 
 /// Outcome of the paper's runs: claims and Table 3 as lists of dicts, and the figures: number, law,
 /// panels (rate in °/s, true for the experiment, time in s and error in °).
@@ -21,37 +21,22 @@ pub(crate) struct Paper {
 #[pyfunction]
 #[pyo3(signature = (progress=None))]
 pub(crate) fn reproduce(py: Python<'_>, progress: Option<Bound<'_, PyAny>>) -> PyResult<Paper> {
-    // A pool of its own: the global one would not live in a forked process.
-    let pool = rayon::ThreadPoolBuilder::new().build();
-    let pool = pool.map_err(|e| PyRuntimeError::new_err(format!("no threads for the runs: {e}")))?;
-    let (stop, finished, total) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
-    let watch = |p: Progress| {
-        total.store(p.total, Ordering::Relaxed);
-        finished.fetch_add(p.finished, Ordering::Relaxed);
-        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let (finished, total) = (AtomicU64::new(0), AtomicU64::new(0));
+    let work = |stop: &AtomicBool| {
+        clutch_sim::paper::reproduce(&|p: Progress| {
+            total.store(p.total, Ordering::Relaxed);
+            finished.fetch_add(p.finished, Ordering::Relaxed);
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
     };
-    let tell = || -> PyResult<()> {
-        py.check_signals()?;
+    let tell = || {
         let (f, t) = (finished.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
         progress.as_ref().map_or(Ok(()), |p| p.call1((f, t)).map(drop))
     };
-    std::thread::scope(|scope| {
-        let work = scope.spawn(|| pool.install(|| clutch_sim::paper::reproduce(&watch)));
-        while !work.is_finished() {
-            py.detach(|| std::thread::sleep(Duration::from_millis(20)));
-            if let Err(e) = tell() {
-                stop.store(true, Ordering::Relaxed);
-                let _ = py.detach(|| work.join());
-                return Err(e);
-            }
-        }
-        tell()?;
-        match work.join() {
-            Ok(Ok(outcome)) => Ok(Paper { outcome }),
-            Ok(Err(e)) => Err(PyRuntimeError::new_err(e.to_string())),
-            Err(_) => Err(PyRuntimeError::new_err("a run of the paper broke")),
-        }
-    })
+    match in_background(py, work, tell)? {
+        Ok(outcome) => Ok(Paper { outcome }),
+        Err(e) => Err(PyRuntimeError::new_err(e.to_string())),
+    }
 }
 
 /// Panels of a figure: rate, true for the experiment, samples.

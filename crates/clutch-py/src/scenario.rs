@@ -1,11 +1,12 @@
 //! Checked scenarios, and the checks of single tables.
 
+use crate::background::no_thread;
 use crate::convert::{
     core_error, from_json, from_table, load_error, os_error, overrides, param_error, scenario_error, to_table,
 };
 use crate::path::Path;
-use clutch_certificate::file::FileError;
-use clutch_cli::certify::{Asked, certificate};
+use clutch_certificate::file::{self, FileError};
+use clutch_cli::certify::{Asked, certificate, check_save};
 use clutch_core::{BrakeGeometry, Friction, FrictionModel};
 use clutch_sim::ScenarioError;
 use clutch_sim::friction_lab::examine;
@@ -98,9 +99,9 @@ impl Scenario {
         save: Option<PathBuf>,
         check: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let asked = match (sampled, save, check) {
+        let asked = match (sampled, &save, check) {
             (false, None, None) => Asked::Nothing,
-            (true, save, None) => Asked::Search(save),
+            (true, _, None) => Asked::Search,
             (false, None, Some(file)) => Asked::Check(file),
             (false, Some(_), _) => {
                 return Err(PyValueError::new_err(
@@ -116,16 +117,23 @@ impl Scenario {
         let scenario = self.0.clone();
         if asked == Asked::Nothing {
             let found = py.detach(|| certificate(&scenario, &asked));
-            return from_json(py, &found.map_err(|e| self.certificate_error(py, &e))?);
+            return from_json(py, &found.map_err(|e| self.certificate_error(py, &e))?.0);
         }
-        // A search takes up to minutes and does not stop half-way: Ctrl-C leaves it to itself.
-        let work = std::thread::spawn(move || certificate(&scenario, &asked));
+        save.as_ref().map_or(Ok(()), check_save).map_err(|e| self.certificate_error(py, &e))?;
+        // A search takes up to minutes and does not stop half-way: Ctrl-C leaves it to itself, and what it finds is dropped.
+        let work =
+            std::thread::Builder::new().spawn(move || certificate(&scenario, &asked)).map_err(no_thread)?;
         while !work.is_finished() {
             py.detach(|| std::thread::sleep(Duration::from_millis(1)));
             py.check_signals()?;
         }
         let found = work.join().map_err(|_| PyRuntimeError::new_err("the search for a proof broke"))?;
-        from_json(py, &found.map_err(|e| self.certificate_error(py, &e))?)
+        let (told, proof) = found.map_err(|e| self.certificate_error(py, &e))?;
+        if let (Some(path), Some(proof)) = (&save, proof) {
+            let written = file::write(path, &proof).map_err(CertificateError::from);
+            written.map_err(|e| self.certificate_error(py, &e.into()))?;
+        }
+        from_json(py, &told)
     }
 
     /// The path, sampled.

@@ -564,6 +564,7 @@ impl Plant {
             return refused("voltage_v", volts, expected);
         }
         self.moving.place(position_rad, velocity_rad_s, voltage_v);
+        self.voltage = voltage_v.unwrap_or(self.voltage);
         self.broken = false;
         Ok(())
     }

@@ -155,7 +155,7 @@ impl Column {
             return Ok(Column::text(texts));
         }
         let bad = |what: &str| Err(PyValueError::new_err(format!("column \"{name}\" {what}")));
-        if values.hasattr("mask")? {
+        if numpy.getattr("ma")?.call_method1("isMaskedArray", (values,))?.is_truthy()? {
             return bad("has a mask: expected an array without missing values");
         }
         let array = numpy.call_method1("asarray", (values,))?;

@@ -1,8 +1,8 @@
 //! Identification and tuning: `clutch.identify`, `clutch.tune`.
 
+use crate::background::in_background;
 use crate::convert::{from_json, log_error, loop_error, os_error, scenario_error};
 use crate::log::read_unless_interrupted;
-use crate::run::unless_interrupted;
 use crate::stepping::native;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::Added;
@@ -15,7 +15,9 @@ use clutch_sim::scenario::read_text_up_to;
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn read_error(py: Python<'_>, e: &ReadError) -> PyErr {
     match e {
@@ -158,12 +160,12 @@ pub(crate) fn tune<'py>(
     let scenario = native(scenario)?;
     let rig = rig(file)?;
     let options = Options { rates_deg_s, candidates, uncertified };
-    let found = py.detach(|| clutch_tune::tune(&scenario.0, rig.as_ref(), &options, &unless_interrupted));
-    // The signal's exception is set already.
-    if let Some(e) = PyErr::take(py) {
-        return Err(e);
-    }
-    let tuned = found.map_err(|e| scenario.error(py, &e))?;
+    let work = |stop: &AtomicBool| {
+        let go_on =
+            |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        clutch_tune::tune(&scenario.0, rig.as_ref(), &options, &go_on)
+    };
+    let tuned = in_background(py, work, || Ok(()))?.map_err(|e| scenario.error(py, &e))?;
     let object = serde_json::to_value(&tuned).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
     let files = tuned.candidates.iter().map(|c| c.scenario.as_ref().map(Scenario::canonical)).collect();
     let proof = tuned.certificate.as_ref().map(serde_json::to_string).transpose();

@@ -19,6 +19,7 @@ pub mod moving_rig;
 mod number;
 pub mod paper;
 pub mod picture;
+pub mod pool;
 pub mod progress;
 pub mod reaching;
 pub mod referee;

@@ -57,13 +57,15 @@ pub struct MovingRig {
     events: Vec<Event>,
 }
 
-/// A shaft at a position and a velocity; bristles bend as in steady sliding, at rest as they have to.
-fn begin(rig: &Rig, position: f64, velocity: f64, volts: f64) -> Shaft {
+/// A shaft at a position and a velocity, with so much torque of the drive; bristles bend as in steady sliding, at rest as they
+/// have to.
+fn begin(rig: &Rig, (position, velocity): (f64, f64), drive: f64, volts: f64) -> Shaft {
     let mut shaft = Shaft::new(position, velocity);
     let plant = &rig.model.plant;
     if let Some(bristles) = plant.friction().bristles() {
-        let torque = plant.params().drive_torque + plant.actuator().torque(volts);
-        let normal = plant.actuator().normal(volts);
+        let torque = drive + plant.actuator().torque(volts);
+        // The disc's friction there is a multiple of the mean.
+        let normal = plant.actuator().normal(volts) * rig.model.friction_factor(position);
         shaft.bend = if velocity != 0.0 {
             bristles.steady(velocity)
         } else if normal > 0.0 {
@@ -102,7 +104,7 @@ impl MovingRig {
             },
             seed,
             begun: 0,
-            shaft: begin(&rig, position, velocity, volts),
+            shaft: begin(&rig, (position, velocity), rig.drive.torque(0.0, 0.0), volts),
             rig,
             origin: position,
             time: 0.0,
@@ -240,7 +242,8 @@ impl MovingRig {
             self.reset(volts);
             (self.volts, self.arriving) = (volts, volts);
         }
-        self.shaft = begin(&self.rig, position, velocity, self.volts);
+        let drive = self.rig.drive.torque(self.time, position - self.origin);
+        self.shaft = begin(&self.rig, (position, velocity), drive, self.volts);
         match &mut self.engine {
             Moves::Exactly(_) => {}
             Moves::InSteps(engine) => engine.begin_with([0.0; 2]),

@@ -26,7 +26,7 @@ pub struct Sweep {
     base: Table,
     keys: Vec<String>,
     rows: Vec<Vec<Value>>,
-    /// None if the row that was tried first is refused, or a key changes more than a value.
+    /// Made of the first row that is a scenario; none if a key changes more than a value.
     shared: OnceLock<Option<Shared>>,
 }
 
@@ -92,11 +92,14 @@ impl Sweep {
     /// # Panics
     /// There is no such row.
     pub fn scenario(&self, row: usize) -> Result<Scenario, ScenarioError> {
-        // The first row decides what the keys are, and makes what all rows share.
-        match self.shared.get_or_init(|| self.share(row)) {
-            Some(shared) => shared.scenario.with(shared.setters.iter().zip(&self.rows[row])),
-            None => self.on_base(row),
+        if self.shared.get().is_none() {
+            // The first row that is a scenario decides what the keys are, and makes what all rows share.
+            let scenario = self.on_base(row)?;
+            self.shared.get_or_init(|| self.share(scenario));
         }
+        let Some(Some(shared)) = self.shared.get() else { return self.on_base(row) };
+        // Of several mistakes in a row the same one is named, whichever row came first.
+        shared.scenario.with(shared.setters.iter().zip(&self.rows[row])).or_else(|_| self.on_base(row))
     }
 
     fn on_base(&self, row: usize) -> Result<Scenario, ScenarioError> {
@@ -104,8 +107,7 @@ impl Sweep {
         Scenario::from_table(&self.origin, self.base.clone(), &set)
     }
 
-    fn share(&self, row: usize) -> Option<Shared> {
-        let scenario = self.on_base(row).ok()?;
+    fn share(&self, scenario: Scenario) -> Option<Shared> {
         let setters = self.keys.iter().map(|key| scenario.setter(key)).collect::<Option<_>>()?;
         Some(Shared { scenario, setters })
     }
@@ -256,6 +258,32 @@ mod tests {
         let found = outcomes(&sweep(&[50.0, -1.0, 80.0]), 2);
         assert!(found[0].is_ok() && found[2].is_ok());
         assert_eq!(found[1].as_ref().unwrap_err().key, "law.pd.kp_v_rad");
+    }
+
+    #[test]
+    fn a_row_with_two_mistakes_is_refused_by_the_same_one_whichever_row_came_first() {
+        let pd = BUILT_IN.iter().find(|b| b.name == "pd_2").unwrap();
+        let both = |duration: f64, kp: f64| vec![Value::Float(duration), Value::Float(kp)];
+        let rows = [both(1.5, 50.0), both(1.5, -1.0), both(-1.0, 50.0), both(-1.0, -1.0)];
+        for keys in [["run.duration_s", "law.pd.kp_v_rad"], ["law.pd.kp_v_rad", "run.duration_s"]] {
+            let own = |row: &Vec<Value>| {
+                let mut row = row.clone();
+                if keys[0] != "run.duration_s" {
+                    row.reverse();
+                }
+                row
+            };
+            let alone = |first: usize| {
+                let order = [&rows[first], &rows[3]].map(own).to_vec();
+                let s = Sweep::new("x", pd.toml.parse().unwrap(), keys.map(str::to_owned).to_vec(), order)
+                    .unwrap();
+                let _ = s.scenario(0);
+                s.scenario(1).unwrap_err().to_string()
+            };
+            assert_eq!(alone(0), alone(3), "{keys:?}");
+            assert_eq!(alone(1), alone(2), "{keys:?}");
+            assert_eq!(alone(0), alone(1), "{keys:?}");
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ use clutch_certificate::Certificate;
 use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
 use clutch_identify::{Believed, Corner, RigFile, believed};
+use clutch_sim::pool;
 use clutch_sim::progress::Report;
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::smooth_speed::RATE;
@@ -195,7 +196,8 @@ pub fn tune(
             None => uncovered(&base)?,
         };
         let (rates_deg_s, corners) = (rates_deg_s.clone(), corners.clone());
-        Job { base, rates_deg_s, corners, output_v, uncovered, options, report }.run()
+        let job = Job { base, rates_deg_s, corners, output_v, uncovered, options, report };
+        pool::install(|| job.run())
     };
     let (limited, output_v) = forwards(&base)?;
     let found = search(limited, output_v)?;

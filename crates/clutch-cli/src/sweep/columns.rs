@@ -112,7 +112,7 @@ impl Grid {
         let kept = [
             ("scenario", self.origin.clone()),
             ("version", BUILD.to_owned()),
-            ("scenario.toml", self.base.to_string()),
+            ("scenario.toml", scenario.canonical()),
         ];
         let kept = kept.map(|(key, text)| (key.to_owned(), text)).to_vec();
         let wrong = || format!("{}: cannot be written", out.display());

@@ -18,7 +18,7 @@ use clutch_sim::{Scenario, ScenarioError};
 use std::borrow::Cow;
 use std::fmt::{Display, Write as _};
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -66,6 +66,8 @@ const PAUSE_S: f64 = 1.0;
 const TRIED: u64 = 256;
 /// More rows than anybody waits for.
 const MOST: u64 = 1_000_000_000;
+/// Longest line of a file that an earlier sweep has begun, bytes.
+const LONGEST: u64 = 1 << 20;
 /// The key of `--seeds`.
 const SEED: &str = "run.seed";
 
@@ -188,7 +190,7 @@ impl Grid {
         }
         let rows = axes.iter().try_fold(1_u64, |n, axis| n.checked_mul(axis.values.len()));
         match rows {
-            Some(rows) if rows <= MOST => Ok(Grid { origin, base: scenario.table().clone(), axes, rows }),
+            Some(rows) if rows <= MOST => Ok(Grid { origin, base: scenario.given(), axes, rows }),
             _ => bail!("--over: the grid has more than {MOST} rows; give fewer values"),
         }
     }
@@ -229,8 +231,9 @@ impl Grid {
     /// True if one of some rows all over the grid is a scenario.
     fn any_runs(&self) -> anyhow::Result<bool> {
         let tried = self.rows.min(TRIED);
-        // By a step that shares few factors with the axes: a row of each of their values is among them.
-        let step = (self.rows / tried) | 1;
+        // By the golden section: evenly all over the grid, and a row of each value of a short axis is among them.
+        let golden = (self.rows as f64 * 0.618_034) as u64;
+        let step = (golden..).find(|step| gcd(*step, self.rows) == 1).unwrap_or(1);
         let sweep = self.sweep((0..tried).map(|i| i * step % self.rows))?;
         Ok((0..sweep.len()).any(|row| sweep.scenario(row).is_ok_and(|scenario| scenario.plan().is_ok())))
     }
@@ -280,6 +283,11 @@ impl Grid {
         });
         Ok(found.into_inner().unwrap_or_default().into_iter().map_while(|row| row).collect())
     }
+}
+
+/// Greatest common divisor.
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 /// A row that has ended.
@@ -339,8 +347,12 @@ impl SweepVerb {
         let (out, resume) = (lines_of(&self.out)?, self.resume);
         let grid = Grid::new(origin, &scenario, self.over, self.seeds)?;
         let stop = stop_flag()?;
-        let Begun { mut file, rows: before, mut refused } =
-            if resume && out.exists() { go_on(&grid, &out, threads, &stop)? } else { begin(&grid, &out)? };
+        let begun = if resume && out.exists() {
+            go_on(&grid, &out, threads, &stop)?
+        } else {
+            Some(begin(&grid, &out)?)
+        };
+        let Some(Begun { mut file, rows: before, mut refused }) = begun else { return Ok(Exit::Stopped) };
         let wrong = || format!("{}: cannot be written", out.display());
         // Each thread has a vector's rows.
         let least = (8 * threads as u64).min(CHUNK.1);
@@ -429,7 +441,8 @@ fn begin(grid: &Grid, out: &Path) -> anyhow::Result<Begun> {
 }
 
 /// A file of the same sweep: each row has the values that this one gives it, and its last whole row, run again, comes out the same.
-fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::Result<Begun> {
+/// None if it is stopped meanwhile.
+fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::Result<Option<Begun>> {
     let name = out.display();
     let wrong = || format!("{}: cannot be read", out.display());
     let header = grid.header()?;
@@ -437,7 +450,11 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     let (mut last, mut length, mut lines, mut refused) = (Vec::new(), 0, 0_u64, 0);
     loop {
         let mut next = Vec::new();
-        reader.read_until(b'\n', &mut next).with_context(wrong)?;
+        reader.by_ref().take(LONGEST).read_until(b'\n', &mut next).with_context(wrong)?;
+        ensure!(
+            (next.len() as u64) < LONGEST,
+            "{name}: has a line of more than {LONGEST} bytes; name another file"
+        );
         if next.last() != Some(&b'\n') {
             break; // the end, or a row that a kill has cut off
         }
@@ -466,6 +483,9 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     ensure!(rows <= grid.rows, "{name}: has {rows} rows, and this sweep {}; name another file", grid.rows);
     if rows > 0 {
         let again = grid.run(rows - 1..rows, threads, stop, clutch_sim::progress::UNWATCHED)?;
+        if again.is_empty() {
+            return Ok(None); // stopped
+        }
         let again = again.into_iter().next().map(|row| row.line);
         let same = again.transpose()?.is_some_and(|again| again == last);
         ensure!(
@@ -477,7 +497,7 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
     let wrong = || format!("{}: cannot be written", out.display());
     let file = OpenOptions::new().append(true).open(out).with_context(wrong)?;
     file.set_len(length).with_context(wrong)?;
-    Ok(Begun { file, rows, refused })
+    Ok(Some(Begun { file, rows, refused }))
 }
 
 #[cfg(test)]
@@ -494,11 +514,47 @@ mod tests {
         assert_eq!(list("a.b=1,2.5, x"), [Value::Integer(1), Value::Float(2.5), Value::String("x".into())]);
         assert_eq!(list("a=1:100:3"), [1.0, 10.0, 100.0].map(Value::Float));
         assert_eq!(list("a=-5:5:3"), [-5.0, 0.0, 5.0].map(Value::Float));
+        // The ends as they are written, and neighbours apart.
+        assert_eq!(list("a=1:99.96:2"), [1.0, 99.96].map(Value::Float));
+        assert_eq!(list("a=10001:10009:3"), [10001.0, 10005.0, 10009.0].map(Value::Float));
         let laws = list("law={ pd = { kp_v_rad = 1.0, kd_v_s_rad = 2.0 } },{ smc = {} }");
         assert_eq!(laws.len(), 2, "{laws:?}");
         assert_eq!(list("a=\"x,y\",z").len(), 2);
         for wrong in ["a", "a=", "a=1,,2", "a=1:2", "a=2:1:3", "a=0:inf:3", "a=x y"] {
             assert!(over(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_row_is_what_the_command_runs_with_its_values_set_on_another_rig_too() {
+        let name = Path::new("pd_2");
+        let scenario = Scenario::load(name, &[("run.duration_s".into(), "1.5".into())]).unwrap();
+        let axes =
+            ["rig.base=paper,bench", "run.engine=auto,dormand_prince", "rig.encoder.quantised=true,false"];
+        let axes: Vec<Over> = axes.map(|text| over(text).unwrap()).into();
+        let grid = Grid::new("pd_2".into(), &scenario, axes, None).unwrap();
+        let sweep = grid.sweep(0..grid.rows).unwrap();
+        for row in 0..grid.rows {
+            let mut set = vec![("run.duration_s".to_owned(), "1.5".to_owned())];
+            let values = grid.keys_of(row).map(|text| text.into_owned());
+            set.extend(grid.axes.iter().map(|axis| axis.key.clone()).zip(values));
+            let alone = Scenario::load(name, &set).unwrap();
+            assert_eq!(sweep.scenario(row as usize).unwrap().canonical(), alone.canonical(), "{set:?}");
+        }
+    }
+
+    #[test]
+    fn a_grid_of_which_one_value_of_a_key_runs_is_seen_to_run() {
+        let scenario = Scenario::load(Path::new("pd_2"), &[]).unwrap();
+        for (good, n) in [("5,-1,-2", 150), ("-2,5,-1", 150), ("-2,-1,5", 150), ("-1,-2,-3,-4,5", 300)] {
+            let kd = over(&format!("law.pd.kd_v_s_rad={good}")).unwrap();
+            let kp = over(&format!("law.pd.kp_v_rad=1:100:{n}")).unwrap();
+            for axes in [vec![kd.clone(), kp.clone()], vec![kp, kd]] {
+                assert!(
+                    Grid::new("pd_2".into(), &scenario, axes, None).unwrap().any_runs().unwrap(),
+                    "{good}"
+                );
+            }
         }
     }
 

@@ -15,6 +15,7 @@ pub(crate) use told::{Quantity, Told};
 use crate::engine::EngineError;
 use crate::lane::MOST_LANES;
 use crate::lanes::fleet::{Gathered, Together};
+use crate::pool;
 use crate::run::room;
 use crate::scenario::Scenario;
 use crate::scenario_error::ScenarioError;
@@ -74,7 +75,7 @@ impl Fleet {
         let targets = Arc::new(targets);
         let begun = seeds.iter().map(|seed| Begun::new(scenario, *seed).map_err(wrong));
         let mut begun = begun.collect::<Result<Vec<_>, _>>()?.into_iter();
-        let of_a_thread = seeds.len().div_ceil(rayon::current_num_threads());
+        let of_a_thread = seeds.len().div_ceil(pool::threads());
         let together = of_a_thread.next_multiple_of(MOST_LANES).clamp(TOGETHER, BLOCK);
         let mut blocks = Vec::new();
         while begun.len() > 0 {
@@ -122,10 +123,11 @@ impl Fleet {
         match &mut self.blocks[..] {
             [block] => block.step(volts),
             blocks => {
-                blocks
-                    .par_iter_mut()
-                    .zip(volts.par_chunks(self.together))
-                    .for_each(|(block, volts)| block.step(volts));
+                let together = self.together;
+                pool::install(|| {
+                    let each = blocks.par_iter_mut().zip(volts.par_chunks(together));
+                    each.for_each(|(block, volts)| block.step(volts));
+                });
             }
         }
         self.blocks.iter().find_map(|block| block.broken()).map_or(Ok(()), Err)

@@ -22,6 +22,7 @@ pub use runs::{SEEDS, Source};
 pub use statements::{Place, STATEMENTS, Statement};
 pub use table3::{TABLE3, Table3Row, reduction};
 
+use crate::pool;
 use crate::progress::Report;
 use crate::run::RunError;
 use runs::Runs;
@@ -44,7 +45,7 @@ pub struct Outcome {
 pub fn reproduce(progress: Report<'_>) -> Result<Outcome, RunError> {
     let stated = STATEMENTS.iter().flat_map(|s| s.measured.cases());
     let cases = stated.chain(figures::cases()).chain(table3::cases()).collect();
-    let runs = Runs::all(&cases, progress)?;
+    let runs = pool::install(|| Runs::all(&cases, progress))?;
     Ok(Outcome {
         figures: figures::of(&runs),
         table3: table3::of(&runs),

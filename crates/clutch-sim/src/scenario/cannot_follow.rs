@@ -1,6 +1,6 @@
 //! A rig's drive and actuator against the path: a shaft that no voltage can keep on it.
 
-use super::{Scenario, ScenarioError};
+use super::{NOISE_ROOTS, Scenario, ScenarioError};
 use crate::number;
 use crate::rig::Rig;
 use crate::ripple::Ripple;
@@ -10,9 +10,6 @@ use clutch_core::{ActuatorKind, Bounds, FixedCounts, Interval, PlantParams, Tole
 const LOOKS: u64 = 2000;
 /// Share of them at which a shaft that is left behind catches up at others.
 const SELDOM: f64 = 0.1;
-
-/// Departure of the torque at random that is allowed for, in its root mean squares.
-const NOISE: f64 = 4.0;
 
 impl Scenario {
     /// The reason why the rig's shaft cannot follow the path for more than a tenth of the run, and what to change; none if the law
@@ -39,7 +36,7 @@ impl Scenario {
         let period = p.sampling.sampling.period.seconds::<f64>();
         let ticks = self.ticks();
         let radians = rig.encoder.radians_per_count::<f64>();
-        let noise = NOISE * p.rig.torque_noise;
+        let noise = NOISE_ROOTS * p.rig.torque_noise;
         let (mut first, mut cannot, mut looks) = (None, 0_u32, 0_u32);
         for tick in (0..ticks).step_by((ticks / LOOKS).max(1) as usize) {
             let target = path.at(tick);

@@ -44,6 +44,9 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 pub use toml::{Table, Value};
 
+/// Root mean squares of a rig's torque noise that the supervisor counts as drive.
+const SUPERVISED_NOISE_ROOTS: f64 = 6.0;
+
 /// A built-in scenario.
 #[derive(Clone, Copy, Debug)]
 pub struct BuiltIn {
@@ -101,6 +104,8 @@ built_in!(
 #[derive(Clone, Debug)]
 pub struct Scenario {
     origin: Arc<str>,
+    /// Contents of the file alone: without what `rig.base` and defaults add.
+    given: Arc<Table>,
     /// Contents of the file, and defaults: made of the tables of `base`, with `changes` not yet in it.
     base: Arc<Table>,
     changes: Vec<(Arc<str>, Value)>,
@@ -201,11 +206,13 @@ impl Scenario {
         set: &[(String, Value)],
     ) -> Result<Scenario, ScenarioError> {
         override_keys(origin, &mut table, set)?;
+        let given = Arc::new(table.clone());
         merge_base(origin, &mut table)?;
         complete(origin, "", &<ScenarioParams as Params<f64>>::INFO, &mut table)?;
         let params: ScenarioParams = read(&table);
         let mut scenario = Scenario {
             origin: origin.into(),
+            given,
             base: Arc::new(table),
             changes: Vec::new(),
             table: OnceLock::new(),
@@ -244,11 +251,12 @@ impl Scenario {
     ) -> Result<Scenario, ScenarioError> {
         let mut scenario = Scenario {
             origin: self.origin.clone(),
+            given: self.given.clone(),
             base: self.base.clone(),
             changes: self.changes.clone(),
             table: OnceLock::new(),
             params: self.params.clone(),
-            knots: self.knots.clone(),
+            knots: Vec::new(),
             map: self.map.clone(),
             plan: None,
         };
@@ -269,7 +277,7 @@ impl Scenario {
         let setters: Option<Vec<_>> = set.iter().map(|(key, _)| self.setter(key)).collect();
         match setters {
             Some(setters) => self.with(setters.iter().zip(set.iter().map(|(_, value)| value))),
-            None => Scenario::from_table(&self.origin, self.table().clone(), set),
+            None => Scenario::from_table(&self.origin, self.given(), set),
         }
     }
 
@@ -489,7 +497,7 @@ impl Scenario {
         let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
         let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-        let noise = 6.0 * rig.params.torque_noise;
+        let noise = SUPERVISED_NOISE_ROOTS * rig.params.torque_noise;
         let (weakest, strongest) = rig.drive.range();
         let friction = rig.model.plant.friction();
         let (envelope, bristles) = (friction.envelope(), friction.bristles().is_some());
@@ -603,11 +611,24 @@ impl Scenario {
     pub fn table(&self) -> &Table {
         self.table.get_or_init(|| {
             let mut table = Table::clone(&self.base);
-            // Keys of rows that are there already: nothing can be wrong.
-            let changes = self.changes.iter().map(|(key, value)| (&**key, value));
-            let _ = override_each(&self.origin, &mut table, changes);
+            self.change(&mut table);
             table
         })
+    }
+
+    /// The contents of its file with what was set, without what `rig.base` and defaults add: what another scenario of it is
+    /// made of, be it on another rig.
+    #[must_use]
+    pub fn given(&self) -> Table {
+        let mut table = Table::clone(&self.given);
+        self.change(&mut table);
+        table
+    }
+
+    fn change(&self, table: &mut Table) {
+        let changes = self.changes.iter().map(|(key, value)| (&**key, value));
+        // Keys of rows that are there already: nothing can be wrong.
+        let _ = override_each(&self.origin, table, changes);
     }
 
     /// The specification of the run.
@@ -795,7 +816,7 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
 
 /// The error of a parameter of the table at `path`, as the file has it.
 fn error_of(origin: &str, path: &str, table: &Table, e: &ParamError) -> ScenarioError {
-    let (Some(info), Some(row)) = (e.table(), e.row()) else {
+    let (Some(_), Some(row)) = (e.table(), e.row()) else {
         return ScenarioError::new(origin, path, "", e.to_string());
     };
     let key = if path.is_empty() { row.key.to_owned() } else { format!("{path}.{}", row.key) };
@@ -809,7 +830,6 @@ fn error_of(origin: &str, path: &str, table: &Table, e: &ParamError) -> Scenario
         Some(relation) => relation.expected.to_owned(),
         None => row.range.words(row.kind, &row.unit, false).to_string(),
     };
-    let _ = info;
     ScenarioError::value(origin, &key, &value, &expected)
 }
 

@@ -85,10 +85,11 @@ impl Scenario {
             )
             .ok()
         };
-        let (mut need, mut accelerates) = (asked, 0.0);
+        let (mut need, mut accelerates, mut damps) = (asked, 0.0, 0.0);
         if let Some(most) = most() {
             need = if asked < 0.0 { most.lowest_voltage } else { most.highest_voltage };
             accelerates = bounds.inertia.high * most.largest_acceleration();
+            damps = bounds.viscous_damping.high * most.velocity;
         }
         let [low, high] = [bounds.drive_torque.low, bounds.drive_torque.high];
         let parts = [
@@ -98,10 +99,11 @@ impl Scenario {
                 "lower rig.actuator.motor.preload_nm and model.actuator.motor.preload_nm",
             ),
             (accelerates, "accelerate more slowly"),
+            (damps, "go more slowly, or lower viscous_damping_nm_s_rad of rig and model"),
         ];
         let largest = parts.iter().fold(0.0_f64, |largest, (torque, _)| largest.max(*torque));
-        let advice: Vec<&str> =
-            parts.iter().filter(|(torque, _)| *torque > 0.3 * largest).map(|(_, advice)| *advice).collect();
+        let heavy = parts.iter().filter(|(torque, _)| *torque > 0.3 * largest);
+        let advice: String = heavy.map(|(_, advice)| format!("{advice}, ")).collect();
         let (key, way, end) = if asked < 0.0 {
             ("lowest_v", "lower", p.rig.dac.converter.lowest)
         } else {
@@ -114,9 +116,8 @@ impl Scenario {
             String::new()
         };
         format!(
-            "it needs {asked:.4} V{on_its_way}, and output.{key} = {available}; {}, {way} output.{key}{also}, or take a motor \
-             with a higher gain_nm_v",
-            advice.join(", ")
+            "it needs {asked:.4} V{on_its_way}, and output.{key} = {available}; {advice}{way} output.{key}{also}, or take a motor \
+             with a higher gain_nm_v"
         )
     }
 }

@@ -1,6 +1,7 @@
 //! Maps: the lowest smooth rate over two gains, and one gain against rates; on all cores.
 
 use super::{Evidence, Failure, RATE, SmoothSpeed, Trials, check, lowest_smooth_speed};
+use crate::pool;
 use crate::progress::{Progress, Report};
 use crate::scenario::Scenario;
 use crate::scenario_error::ScenarioError;
@@ -86,7 +87,7 @@ pub fn gain_map(
         told(report, total, cell)
     };
     let row = |b: &f64| x.values.par_iter().map(|a| cell(*b, *a)).collect::<Result<Vec<_>, _>>();
-    let cells = y.values.par_iter().map(row).collect::<Result<_, _>>()?;
+    let cells = pool::install(|| y.values.par_iter().map(row).collect::<Result<_, _>>())?;
     Ok(GainMap { x, y, cells })
 }
 
@@ -116,7 +117,7 @@ pub fn rate_map(
         let rates = trials.rates_deg_s().par_iter().map(|rate| tried(*a, *rate)).collect::<Result<_, _>>()?;
         Ok(Column { rates })
     };
-    let columns = x.values.par_iter().map(column).collect::<Result<_, ScenarioError>>()?;
+    let columns = pool::install(|| x.values.par_iter().map(column).collect::<Result<_, ScenarioError>>())?;
     Ok(RateMap { x, rates_deg_s: trials.rates_deg_s().to_vec(), discs: trials.discs(), columns })
 }
 
