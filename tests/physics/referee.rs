@@ -174,7 +174,7 @@ fn each_mistake_in_a_case_is_named() {
         ("inertia = [[1.0]]", "inertia = [[1.0, 0.0]]", "mechanism.inertia: expected 1 rows of 1 numbers"),
         ("stiffness = [[2.0]]", "spring = [[2.0]]", "unknown field `spring`"),
         ("velocity = [0.1]", "velocity = [0.1, 0.2]", "mechanism.velocity: 2 numbers; expected 1"),
-        ("joints = [1.0]", "joints = []", "mechanism.row[0].joints: expected 1 finite numbers"),
+        ("joints = [1.0]", "joints = []", "mechanism.row[0].joints = []: expected 1 finite numbers"),
         (
             "constant = 1.0",
             "constant = inf",

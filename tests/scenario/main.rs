@@ -191,14 +191,23 @@ fn a_path_that_a_motor_cannot_follow_says_what_may_change() {
     };
     let weak =
         told(&[("output.highest_v", "0.01"), ("output.lowest_v", "-0.01"), ("output.on_invalid_v", "0")]);
-    for word in ["V, and output.highest_v = 0.01", "more slowly", "raise the limit", "higher gain_nm_v"] {
+    for word in [
+        "V, and output.highest_v = 0.01",
+        "lower rig.actuator.motor.preload_nm",
+        "raise output.highest_v,",
+        "higher gain_nm_v",
+    ] {
         assert!(weak.contains(word), "{weak}");
     }
     // 5 kg on the drum drive it forwards with 1.18 N m, which no voltage within the limits holds back.
     let loaded = told(&[("rig.drive", "{weight = {mass_kg = 5.0}}"), ("model.drive_torque_nm", "1.1772")]);
-    for word in
-        ["needs -22.9", "output.lowest_v = -10;", "lower the limit", "hang less on it", "higher gain_nm_v"]
-    {
+    for word in [
+        "needs -22.9",
+        "output.lowest_v = -10;",
+        "hang less on it",
+        "lower output.lowest_v and rig.dac.lowest_v",
+        "higher gain_nm_v",
+    ] {
         assert!(loaded.contains(word), "{loaded}");
     }
 }

@@ -31,7 +31,7 @@ use clutch_sim::Metrics;
 use clutch_sim::detected::Detector;
 use clutch_sim::meter::Gap;
 use clutch_sim::metrics::{Detected, MetricsBuilder, MetricsSample};
-use clutch_wire::{Refused, StopReason};
+use clutch_wire::{BoardState, Refused, STATUS_STATE, StopReason};
 use rustix::fd::AsFd;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -455,7 +455,8 @@ impl<'a, S: Station> Control<'a, S> {
                 2
             };
             self.push(&records[..used]);
-            self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
+            let board = BoardState::from_u8(n.sample.status & STATUS_STATE);
+            self.board_safe |= matches!(board, Some(BoardState::Stopped | BoardState::Faulted));
             // Until the next sample: numbers come again.
             let passed = if n.cycle.answer.is_none() { u32::from(n.sample.sequence) + 1 } else { 0 };
             self.watch.passed.store(passed, Ordering::Relaxed);

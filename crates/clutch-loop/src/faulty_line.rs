@@ -2,7 +2,8 @@
 
 use crate::faults::{Direction, Fault, FaultKind, Forgery, Lie};
 use clutch_wire::{
-    Actuate, BoardState, Decoder, Message, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, Sample, encode,
+    Actuate, BoardState, Decoder, Message, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_STATE, Sample,
+    encode,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -165,7 +166,7 @@ fn message(frame: &[u8]) -> Option<Message> {
 fn said(lie: Lie, frame: &[u8]) -> Option<Vec<u8>> {
     let Message::Sample(sample) = message(frame)? else { return None };
     let sample = match lie {
-        Lie::Idle => Sample { status: (sample.status & !0x07) | BoardState::Ready as u8, ..sample },
+        Lie::Idle => Sample { status: (sample.status & !STATUS_STATE) | BoardState::Ready as u8, ..sample },
         Lie::Encoder => Sample { status: sample.status | STATUS_ENCODER_FAULT, ..sample },
         Lie::Converter => Sample { status: sample.status | STATUS_DAC_FAULT, ..sample },
         Lie::OtherRun => Sample { run: sample.run.wrapping_add(1), ..sample },

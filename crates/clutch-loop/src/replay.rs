@@ -15,7 +15,7 @@ use clutch_sim::detected::Detector;
 use clutch_sim::progress::{Progress, Report};
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Keep, Scenario};
-use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
+use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE};
 
 /// A log could not be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -233,7 +233,7 @@ fn seen(s: &SampleRecord) -> Sample {
         sequence: s.sequence,
         time: Micros(s.board_time_us),
         counts: Counts(s.counts),
-        board: match BoardState::from_u8(s.status & 0x07) {
+        board: match BoardState::from_u8(s.status & STATUS_STATE) {
             Some(BoardState::Ready) => BoardMode::Ready,
             Some(BoardState::Armed | BoardState::Running) => BoardMode::Driving,
             _ => BoardMode::Safe,

@@ -82,6 +82,25 @@ pub enum ServeError {
     Line(#[from] std::io::Error),
 }
 
+/// True if the newest sample is to be answered, and the answer has not come. One that the loop does not believe gets none.
+fn awaits(options: &ServeOptions, board: &SimBoard) -> bool {
+    let passed = options.passed.load(Ordering::Relaxed);
+    board.node().unanswered().is_some_and(|sample| u32::from(sample) + 1 != passed)
+}
+
+/// Writes what the line takes now.
+fn send(endpoint: &mut dyn Endpoint, unsent: &mut Vec<u8>) -> std::io::Result<()> {
+    if !unsent.is_empty() {
+        let sent = endpoint.write(unsent)?;
+        unsent.drain(..sent);
+        // A client that does not read is as good as none.
+        if unsent.len() > 65_536 {
+            unsent.clear();
+        }
+    }
+    Ok(())
+}
+
 /// Runs a simulated board until `stop`.
 ///
 /// # Errors
@@ -146,11 +165,7 @@ pub fn serve(
         if board.next_ns().is_some_and(|due| due <= now) {
             let wall = monotonic_ns();
             let since = *waiting_since.get_or_insert(wall);
-            // A sample that the loop does not believe gets no answer; nothing holds it up.
-            let passed = options.passed.load(Ordering::Relaxed);
-            let unanswered = board.node().unanswered().filter(|sample| u32::from(*sample) + 1 != passed);
-            let held_up = patient && present && unanswered.is_some();
-            if held_up && wall - since < PATIENCE.as_nanos() as u64 {
+            if patient && present && awaits(options, &board) && wall - since < PATIENCE.as_nanos() as u64 {
                 // The clock stands still, a little before the sample, until the answer comes.
                 slipped = wall - now + WAIT_NS;
                 report.waits += u64::from(since == wall);
@@ -175,14 +190,7 @@ pub fn serve(
         while let Some(bytes) = up.arrived(now) {
             unsent.extend(bytes);
         }
-        if !unsent.is_empty() {
-            let sent = endpoint.write(&unsent)?;
-            unsent.drain(..sent);
-            // A client that does not read is as good as none.
-            if unsent.len() > 65_536 {
-                unsent.clear();
-            }
-        }
+        send(endpoint, &mut unsent)?;
     }
     report.samples = board.samples();
     report.hits = up.hits().0 + down.hits().0 + u64::from(board.first_hit_ns().is_some());

@@ -11,7 +11,7 @@ use clutch_core::{
 };
 use clutch_wire::{
     Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, SCHEMA, STATUS_DAC_FAULT,
-    STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, StopReason, VERSION,
+    STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE, Sample, Stop, StopReason, VERSION,
 };
 
 /// Parameters of a run, on the wire.
@@ -308,7 +308,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             self.counts.foreign = self.counts.foreign.wrapping_add(1);
             return;
         }
-        let board = BoardState::from_u8(sample.status & 0x07);
+        let board = BoardState::from_u8(sample.status & STATUS_STATE);
         let seen = Seen {
             sequence: sample.sequence,
             time: Micros(sample.time_us),

@@ -382,6 +382,11 @@ fn output(draw: &Draw, o: &VirtualReport) -> Option<String> {
         .then(|| format!("{at_once} V at once and {in_the_end} V in the end instead of {:?}", s.safe))
 }
 
+/// The end of control in words.
+fn ended_by(cause: Option<Cause>) -> String {
+    cause.map_or_else(|| "never ended".to_owned(), |cause| format!("ended by {cause:?}"))
+}
+
 /// The fate of control, and its cause.
 fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> {
     let (s, alone) = (&draw.healthy, promises.len() <= 1);
@@ -443,20 +448,21 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         let patient = if line { f64::from(s.cycles) } else { 0.0 };
         let within = if alone { within } else { within + (2.0 + patient) * PERIOD };
         let Some(safe) = o.safe else {
-            return Some(format!("the safe output was never in force; cause {:?}", o.cause));
+            return Some(format!("the safe output was never in force; {}", ended_by(o.cause)));
         };
         // A microsecond for the clock's grain.
         if safe - begun > within + 1e-6 {
             let took = (safe - begun) * 1e3;
             return Some(format!(
-                "safe output after {took:.3} ms instead of {:.3} ms; cause {:?}",
+                "safe output after {took:.3} ms instead of {:.3} ms; {}",
                 within * 1e3,
-                o.cause
+                ended_by(o.cause)
             ));
         }
         let named = o.cause.is_none_or(|c| promise.causes.is_empty() || promise.causes.contains(&c));
         if alone && !named {
-            return Some(format!("named {:?} instead of one of {:?}", o.cause, promise.causes));
+            let expected: Vec<String> = promise.causes.iter().map(|cause| format!("{cause:?}")).collect();
+            return Some(format!("{}, expected {}", ended_by(o.cause), expected.join(" or ")));
         }
         if alone && o.cause.is_none() && !promise.causes.is_empty() && !promise.causes.contains(&Cause::Board)
         {
