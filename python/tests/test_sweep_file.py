@@ -88,6 +88,23 @@ def test_a_file_of_another_sweep_is_refused_and_stays(short, tmp_path, change, m
         clutch.sweep_to_file(tmp_path / "none.csv", short, parameters, resume=True)
 
 
+def test_a_parquet_file_that_is_cut_off_while_it_is_made_is_made_again(short, tmp_path, monkeypatch):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    out = tmp_path / "rows.parquet"
+    with monkeypatch.context() as broken:
+
+        def full(self, batch):
+            raise OSError("no space left")
+
+        broken.setattr(parquet.ParquetWriter, "write_batch", full)
+        with pytest.raises(OSError, match="no space left"):
+            clutch.sweep_to_file(out, short, GAINS)
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.parquet.part.csv"]
+    done = clutch.sweep_to_file(out, short, GAINS, resume=True)
+    assert (done.path, done.before, done.rows) == (out, 6, 6)
+    assert parquet.read_table(out).num_rows == 6
+
+
 def test_parquet_has_the_rows_their_kinds_and_units(short, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     out = tmp_path / "rows.parquet"

@@ -252,6 +252,9 @@ def test_a_table_takes_any_array_and_names_what_it_cannot_take():
         assert table[name].tolist() == plain.tolist(), name
     assert table["reversed"].tolist() == plain[::-1].tolist()
     assert table["word"] == ["a", "b", "c", "d", "e", "f"]
+    pandas = pytest.importorskip("pandas")
+    series = package.Table({"x": pandas.Series(plain), "word": pandas.Series(["a"] * 6)})
+    assert (series["x"].tolist(), series["word"]) == (plain.tolist(), ["a"] * 6)
     for bad, match in (
         ({"x": np.zeros((2, 2))}, r'column "x" has the shape \(2, 2\): expected one dimension'),
         ({"x": np.zeros(2), "y": np.zeros(3)}, r'column "y" has 3 rows: expected 2, as many as column "x"'),
