@@ -352,7 +352,10 @@ impl SweepVerb {
         } else {
             Some(begin(&grid, &out)?)
         };
-        let Some(Begun { mut file, rows: before, mut refused }) = begun else { return Ok(Exit::Stopped) };
+        let Some(Begun { mut file, rows: before, mut refused }) = begun else {
+            tell(&format!("{}: as it was; stopped: --resume goes on\n", out.display()))?;
+            return Ok(Exit::Stopped);
+        };
         let wrong = || format!("{}: cannot be written", out.display());
         // Each thread has a vector's rows.
         let least = (8 * threads as u64).min(CHUNK.1);
@@ -486,8 +489,8 @@ fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::
         if again.is_empty() {
             return Ok(None); // stopped
         }
-        let again = again.into_iter().next().map(|row| row.line);
-        let same = again.transpose()?.is_some_and(|again| again == last);
+        let again: Vec<Vec<u8>> = again.into_iter().map(|row| row.line).collect::<anyhow::Result<_>>()?;
+        let same = again == [last];
         ensure!(
             same,
             "{name}: its row {rows} is not what this sweep gives: it is of another scenario, other values or another version \
