@@ -32,14 +32,13 @@ impl Scenario {
     }
 
     fn certificate_error(&self, py: Python<'_>, e: &anyhow::Error) -> PyErr {
-        let file = match e.downcast_ref::<CertificateError>() {
-            Some(CertificateError::File(file)) => Some(file),
-            _ => e.downcast_ref::<FileError>(),
-        };
-        match (e.downcast_ref::<ScenarioError>(), file) {
+        let text = e.to_string();
+        match (e.downcast_ref::<ScenarioError>(), e.downcast_ref::<CertificateError>()) {
             (Some(e), _) => self.error(py, e),
-            (_, Some(FileError::Io { name, error })) => os_error(py, name.as_ref(), &e.to_string(), error),
-            _ => PyValueError::new_err(e.to_string()),
+            (_, Some(CertificateError::File(FileError::Io { name, error }))) => {
+                os_error(py, name.as_ref(), &text, error)
+            }
+            _ => PyValueError::new_err(text),
         }
     }
 }
