@@ -4,13 +4,14 @@
 use crate::{beside, equal, on, simulate};
 use clutch_core::supervisor::{Cause, State};
 use clutch_loop::chip_board::{
-    ChipBoard, ChipFault, ChipFaultKind, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession,
+    AloneReport, AloneSession, ChipBoard, ChipFault, ChipFaultKind, ChipKind, ChipOptions, ChipReport,
+    ChipRole, ChipSession,
 };
 use clutch_loop::lockstep_board::InProcessBoard;
 use clutch_loop::lockstep_session::LockstepOptions;
 use clutch_loop::virtual_time::{VirtualBoard, VirtualReport};
 use clutch_node::Outbox;
-use clutch_sim::Scenario;
+use clutch_sim::{Metrics, Scenario};
 use clutch_tests::firmware::image;
 use clutch_wire::{
     BoardState, Decoder, Discover, Hello, Message, ResetCause, SCHEMA, VERSION, WARNING_BROWN_OUT, encode,
@@ -164,6 +165,57 @@ fn the_example_of_the_pico_is_the_same_node_in_this_process_bit_for_bit() {
 #[test]
 fn a_law_on_this_machine_through_the_chip_is_the_simulation_bit_for_bit() {
     figures_and_codes_are_the_simulations("nucleo-daq", ChipRole::Daq, "smc");
+}
+
+/// The run that nucleo-alone has compiled in, and its faults.
+fn without_a_host(image: &Path, faults: Vec<ChipFault>) -> (Scenario, AloneReport) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/nucleo_smc_2.toml");
+    let scenario = Scenario::load(&file, &[]).expect("the example");
+    let session = AloneSession::new(scenario.clone(), false, faults, None).expect("a session");
+    (scenario, session.run(image).expect("the chip runs"))
+}
+
+#[test]
+fn a_controller_without_a_host_is_the_simulation_bit_for_bit() {
+    let Some(image) = image("nucleo-alone") else { return };
+    let _beside = beside();
+    let (scenario, ran) = without_a_host(&image, Vec::new());
+    let simulated = simulate(&scenario);
+    assert_eq!(ran.codes, simulated.trace.code);
+    assert_eq!((ran.codes.len(), ran.differs(), ran.done()), (10_000, None, true));
+    assert_eq!((ran.flashes, ran.fault(), ran.resets, ran.dead), (1, None, 0, false));
+    let figures = Metrics { stick_time_fraction: simulated.metrics.stick_time_fraction, ..ran.metrics };
+    assert_eq!(figures, simulated.metrics);
+    assert!((ran.metrics.stick_time_fraction - simulated.metrics.stick_time_fraction).abs() < 1e-12);
+    // 4.5 V of 10 V: the safe state of the scenario, not the code of power-up.
+    assert_eq!(ran.last_code, 1843);
+}
+
+#[test]
+fn a_controller_without_a_host_ends_in_its_safe_output_whatever_breaks() {
+    let Some(image) = image("nucleo-alone") else { return };
+    let _beside = beside();
+    let broken = |kind| {
+        let (_, ran) = without_a_host(&image, vec![ChipFault { kind, at: Some(0.3) }]);
+        assert!(!ran.done(), "{kind:?}");
+        let ticks = 300..=303;
+        assert!(ticks.contains(&ran.codes.len()), "{kind:?}: control ended after {} ticks", ran.codes.len());
+        assert!(ran.differs().is_none_or(|tick| tick >= 300), "{kind:?}: {:?}", ran.differs());
+        ran
+    };
+    use ChipFaultKind::{ConverterStuck, Hang, Nmi, Panic, StackOverflow, SupplyLow, Undefined, Unexpected};
+    for kind in [Undefined, Nmi, Unexpected, StackOverflow, Panic] {
+        let ran = broken(kind);
+        assert_eq!((ran.resets, ran.flashes, ran.last_code), (1, 0, BOOT_CODE), "{kind:?}");
+    }
+    for kind in [SupplyLow, ConverterStuck] {
+        let ran = broken(kind);
+        let code = if kind == ConverterStuck { ran.codes[299] } else { 1843 };
+        assert_eq!((ran.resets, ran.fault(), ran.last_code), (0, Some(Cause::Board), code), "{kind:?}");
+    }
+    // The lamp stays lit until the watchdog resets the chip.
+    let (_, ran) = without_a_host(&image, vec![ChipFault { kind: Hang, at: Some(0.3) }]);
+    assert_eq!((ran.resets, ran.done(), ran.flashes, ran.last_code), (1, false, 0, BOOT_CODE));
 }
 
 /// A run in which something breaks on the chip; `at` s after arming, or at power-up.

@@ -34,26 +34,37 @@ impl HeaderVerb {
             "--name {}: expected a name of C, of letters, digits and underscores",
             self.name
         );
-        let scenario = self.scenario.load()?;
-        match check(&scenario, None, self.uncertified, None) {
-            Ok(_) => {}
-            Err(ClearanceError::NotCertified { lack, .. }) => {
-                let file = self.scenario.scenario.display();
-                let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
-                let advice =
-                    format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
-                warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
-                return Ok(Exit::NotCertified);
-            }
-            Err(refusal) => return Err(refusal.into()),
-        }
-        let single = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
-        let run = BuiltRun::new(&single, 0)?;
-        // Nobody but the program itself looks on.
-        let settings = from_scenario::settings(&single, &run, Micros(0), run.ticks)?;
+        let Some((single, run, settings)) = compiled_in(&self.scenario, self.uncertified)? else {
+            return Ok(Exit::NotCertified);
+        };
         print(&header(&self.name, &single, &settings, &run))?;
         Ok(Exit::Done)
     }
+}
+
+/// A scenario's run for a program that has it compiled in: in single precision, and such that a board takes it. None, and
+/// the reason is printed, if its gains are not certified.
+pub(crate) fn compiled_in(
+    scenario: &ScenarioArgs,
+    uncertified: bool,
+) -> anyhow::Result<Option<(Scenario, BuiltRun<f32>, Settings)>> {
+    let file = scenario.scenario.display();
+    let scenario = scenario.load()?;
+    match check(&scenario, None, uncertified, None) {
+        Ok(_) => {}
+        Err(ClearanceError::NotCertified { lack, .. }) => {
+            let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
+            let advice = format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
+            warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
+            return Ok(None);
+        }
+        Err(refusal) => return Err(refusal.into()),
+    }
+    let single = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
+    let run = BuiltRun::new(&single, 0)?;
+    // Nobody but the program itself looks on.
+    let settings = from_scenario::settings(&single, &run, Micros(0), run.ticks)?;
+    Ok(Some((single, run, settings)))
 }
 
 fn header(name: &str, scenario: &Scenario, settings: &Settings, run: &BuiltRun<f32>) -> String {

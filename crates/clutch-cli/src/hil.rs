@@ -11,7 +11,9 @@ use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_loop::cause_words::cause_text;
-use clutch_loop::chip_board::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession};
+use clutch_loop::chip_board::{
+    AloneReport, AloneSession, ChipFault, ChipKind, ChipOptions, ChipRole, ChipSession,
+};
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
@@ -47,9 +49,10 @@ pub(crate) struct Hil {
     /// Overrides a key of the scenario; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// The board's image: a file, or mps2-controller, nucleo-controller, nucleo-daq, pico-controller or
-    /// pico-daq. One whose name begins with nucleo- or pico- runs on the chip's model, in the role daq
-    /// if its name says so.
+    /// The board's image: a file, or mps2-controller, nucleo-controller, nucleo-daq, nucleo-alone,
+    /// pico-controller or pico-daq. One whose name begins with nucleo- or pico- runs on the chip's
+    /// model, in the role daq if its name says so; one that says alone has its run compiled in, and its
+    /// button is pressed.
     #[arg(long, value_name = "IMAGE", default_value = "mps2-controller")]
     image: PathBuf,
     /// Link to the board in qemu.
@@ -105,7 +108,7 @@ impl Hil {
         if !self.chip_fault.is_empty() || self.count.is_some() {
             anyhow::bail!(
                 "--chip-fault and --count: {} does not run on a chip's model; use --image nucleo-controller, \
-                 nucleo-daq, pico-controller or pico-daq",
+                 nucleo-daq, nucleo-alone, pico-controller or pico-daq",
                 self.image.display()
             );
         }
@@ -153,6 +156,9 @@ impl Hil {
                  --chip-fault those of the chip"
             );
         }
+        if role == ChipRole::Alone {
+            return self.alone(kind, chip);
+        }
         let session = ChipSession::new(self.load()?, self.options(), chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
         let session = session.looked_at(self.looking()?);
@@ -174,9 +180,47 @@ impl Hil {
             json(&all)
         };
         report(self.json, all, || {
-            self.text(scenario, ran, &format!("the model of an {}", kind.name()), took) + &chip_text(&on_chip)
+            self.text(scenario, ran, &format!("the model of an {}", kind.name()), took)
+                + &chip_text(on_chip.resets, on_chip.dead, on_chip.floating)
         })?;
         Ok(exit(ran))
+    }
+
+    /// An image without a host, on the model of the chip.
+    fn alone(self, kind: ChipKind, chip: ChipOptions) -> anyhow::Result<Exit> {
+        if self.log.is_some() || !self.fault.is_empty() || self.latency_us > 0 || self.live.asked_for() {
+            anyhow::bail!(
+                "--log, --fault, --latency-us and the views: {} has no line to a host",
+                self.image.display()
+            );
+        }
+        let session = AloneSession::new(self.load()?, self.uncertified, chip.faults, chip.count);
+        let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
+        tell(session.note());
+        let started = std::time::Instant::now();
+        let ran = session.run(&self.image)?;
+        let took = started.elapsed().as_secs_f64();
+        let scenario = session.scenario();
+        let all = || {
+            json(&serde_json::json!({
+                "scenario": scenario.name(),
+                "version": env!("CARGO_PKG_VERSION"),
+                "seed": scenario.spec().run.seed,
+                "ticks": ran.codes.len(),
+                "took_s": took,
+                "metrics": ran.metrics,
+                "differs_at_tick": ran.differs(),
+                "flashes": ran.flashes,
+                "cause": ran.fault().map(|cause| format!("{cause:?}")),
+                "chip": chip_json(&ran),
+            }))
+        };
+        report(self.json, all, || alone_text(scenario, &ran, kind, took))?;
+        Ok(match (ran.done(), ran.differs()) {
+            (false, _) => Exit::Fault,
+            (true, Some(_)) => Exit::Failed,
+            (true, None) => Exit::Done,
+        })
     }
 
     fn load(&self) -> anyhow::Result<Scenario> {
@@ -247,6 +291,54 @@ impl Hil {
     }
 }
 
+/// The figures of a run without a host, its codes beside those of this machine, and what the lamp says.
+fn alone_text(scenario: &Scenario, ran: &AloneReport, kind: ChipKind, took: f64) -> String {
+    let title = format!(
+        "{}\n{} ticks on the model of an {} in {took:.1} s, seed {}\nfigures over {} s after settling",
+        scenario.name(),
+        ran.codes.len(),
+        kind.name(),
+        scenario.spec().run.seed,
+        number(ran.metrics.measured_s)
+    );
+    let mut text = quantities(&title, &sim::figures(&ran.metrics));
+    let code = |codes: &[u16], tick: usize| codes.get(tick).map_or("none".to_owned(), u16::to_string);
+    text += &paragraph(&match ran.differs() {
+        None => "each code is that of the same controller in this process".to_owned(),
+        Some(tick) if ran.done() => format!(
+            "tick {tick}: its code is {}, that of the same controller in this process {}. The image has its run compiled \
+             in: is it this scenario's (clutch scenario rust)? A law with memory begins with the voltage that the brake \
+             has: BOOT_CODE there, the safe state's here.",
+            code(&ran.codes, tick),
+            code(&ran.expected, tick)
+        ),
+        Some(tick) => format!("the first {tick} codes are those of the same controller in this process"),
+    });
+    let end = match (ran.flashes, ran.fault()) {
+        (0, _) => "the lamp does not flash".to_owned(),
+        (1, _) if ran.done() => {
+            "the lamp flashes once: the path is done, and the safe output holds".to_owned()
+        }
+        (n, Some(cause)) => format!("FAULT: the lamp flashes {n} times, {cause:?} (docs/firmware.md)"),
+        (n, None) => format!("the lamp flashes {n} times"),
+    };
+    let ended =
+        if ran.done() { String::new() } else { format!("; control ended after {} ticks", ran.codes.len()) };
+    text += &paragraph(&(end + &ended));
+    text + &chip_text(ran.resets, ran.dead, ran.floating)
+}
+
+/// The state of the chip at the end.
+fn chip_json(ran: &AloneReport) -> serde_json::Value {
+    serde_json::json!({
+        "resets": ran.resets,
+        "dead": ran.dead,
+        "floating": ran.floating,
+        "code": ran.last_code,
+        "counted": ran.counted,
+    })
+}
+
 /// A remark, on standard error.
 fn tell(note: Option<&str>) {
     if let Some(note) = note {
@@ -264,15 +356,15 @@ fn exit(ran: &Ran) -> Exit {
 }
 
 /// The state of the chip at the end, where it is not as always.
-fn chip_text(report: &ChipReport) -> String {
+fn chip_text(resets: u32, dead: bool, floating: bool) -> String {
     let mut text = String::new();
-    if report.resets > 0 {
-        text += &format!("the chip was reset: {}\n", report.resets);
+    if resets > 0 {
+        text += &format!("the chip was reset: {resets}\n");
     }
-    if report.dead {
+    if dead {
         text += "the chip's program does not run any more\n";
     }
-    if report.floating {
+    if floating {
         text += "the converter decides nothing: divider or switch at the driver's input hold\n";
     }
     text

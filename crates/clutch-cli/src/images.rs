@@ -7,10 +7,11 @@ use std::sync::OnceLock;
 
 /// The images that are found without a path, and their targets: `cargo xtask firmware build` leaves them in the folder
 /// of their target.
-const NAMES: [(&str, &str); 5] = [
+const NAMES: [(&str, &str); 6] = [
     ("mps2-controller", "thumbv7em-none-eabihf"),
     ("nucleo-controller", "thumbv7em-none-eabihf"),
     ("nucleo-daq", "thumbv7em-none-eabihf"),
+    ("nucleo-alone", "thumbv7em-none-eabihf"),
     ("pico-controller", "thumbv6m-none-eabi"),
     ("pico-daq", "thumbv6m-none-eabi"),
 ];

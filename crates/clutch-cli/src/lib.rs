@@ -31,6 +31,7 @@ mod replay;
 pub mod report;
 mod reproduce;
 mod run_figure;
+mod rust_run;
 mod sampled;
 mod scenario;
 mod shell;

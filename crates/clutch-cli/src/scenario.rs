@@ -2,6 +2,7 @@
 
 use crate::c_header::HeaderVerb;
 use crate::output::{Exit, beside, json, print, tell};
+use crate::rust_run::RustVerb;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::expected;
@@ -44,6 +45,7 @@ enum Verb {
     #[command(after_help = "Example:\n  clutch scenario schema > scenario.schema.json")]
     Schema,
     Header(HeaderVerb),
+    Rust(RustVerb),
 }
 
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
@@ -65,6 +67,7 @@ impl ScenarioVerb {
             }
             Verb::Schema => print(&json(&schema())?)?,
             Verb::Header(verb) => return verb.run(),
+            Verb::Rust(verb) => return verb.run(),
             Verb::Show { name } => print(find(&name)?.toml)?,
             Verb::New { file, from } => {
                 let text = find(&from)?.toml;

@@ -11,6 +11,8 @@
 //!  HostNode ◄──settings, telemetry──► BoardController (a ControllerNode) ◄──as above──► BoardNode
 //! ```
 //!
+//! Or there is no host, and a button gives consent: [`Alone`].
+//!
 //! [`BoardNode`] is what a board at encoder and converter does: it samples, applies codes, and goes to the
 //! safe state by itself when the controller falls silent. [`ControllerNode`] is what drives it. Bytes
 //! and times go in, bytes and notices come out; the Linux loop, the simulated board, the tests in
@@ -29,10 +31,12 @@
 //! | `board_controller` | board | a controller that a host looks at |
 //! | `host` | PC | what sets a board controller up and looks on |
 //! | `one_chip` | board | a board controller and its board in one memory |
+//! | `alone` | board | a controller without a host |
 //! | `notice`, `outbox` | both | what a node reports, and its frames on their way out |
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod alone;
 mod board;
 mod board_controller;
 mod board_counter;
@@ -46,6 +50,7 @@ mod notice;
 mod one_chip;
 mod outbox;
 
+pub use alone::{Alone, AloneMisfit, AloneRun};
 pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, present_code};
 pub use board_counter::WideCounter;

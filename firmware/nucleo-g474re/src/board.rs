@@ -63,7 +63,7 @@ const BAUD: u32 = 921_600;
 
 /// Time without a completed period after which the program is reset, µs. The clock of this watchdog
 /// may be off by several percent; two of the longest periods are far within.
-const WATCHDOG_US: u32 = 10_000;
+pub const WATCHDOG_US: u32 = 10_000;
 
 /// Threshold of the supply monitor, by the chip's list: 2.9 V.
 const SUPPLY_2_9_V: u8 = 6;

@@ -3,6 +3,7 @@
 #![no_std]
 
 pub mod board;
+pub mod button;
 pub mod fault;
 mod program;
 mod read_back;

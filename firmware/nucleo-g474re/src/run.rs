@@ -60,6 +60,7 @@ pub async fn run<const READ_BACK: bool>(
     }
 }
 
-fn every(period_us: u32) -> Ticker {
+/// A beat of a period, µs.
+pub fn every(period_us: u32) -> Ticker {
     Ticker::every(Duration::from_micros(period_us.into()))
 }

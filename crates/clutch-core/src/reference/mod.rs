@@ -24,16 +24,14 @@ mod target;
 mod tests;
 mod wave;
 
-pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
-pub use table::{Interpolation, Knot, Prepared, Steepness, Table};
+pub use profile::{JerkLimited, MinimumJerk, Profile, Trapezoid};
+pub use table::{Interpolation, Knot, Prepared, Steepness, Table, Tabulated};
 pub use target::Target;
-pub use wave::{Chirp, Sine};
+pub use wave::{Chirp, Sine, Wave};
 
-use crate::params::{Range, Table as _};
-use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
-use profile::Profile;
+use crate::params::Range;
+use crate::{Encoder, FixedCounts, Micros, ParamError, Planned, Real};
 use scale::Scale;
-use wave::Wave;
 
 crate::params! {
     /// Constant rate from the first tick: the paper's path.
@@ -77,6 +75,40 @@ impl<T> ReferenceParams<'_, T> {
     }
 }
 
+/// A path of one kind, for a program that has no other: each kind's code then stays out of it but this one's.
+pub trait OneKind<T: Real> {
+    /// The checked path.
+    type Path: Planned<T>;
+
+    /// The checked path, from position 0 on.
+    ///
+    /// # Errors
+    /// The first parameter out of range, by name.
+    fn path(&self, encoder: Encoder, period: Micros) -> Result<Self::Path, ParamError<T>>;
+}
+
+/// A kind whose path is of another type, from factors between its units and counts.
+macro_rules! one_kind {
+    ($($kind:ident $path:ident $made:ident;)+) => {$(
+        impl<T: Real> OneKind<T> for $kind<T> {
+            type Path = $path<T>;
+
+            fn path(&self, encoder: Encoder, period: Micros) -> Result<$path<T>, ParamError<T>> {
+                $path::$made(self, Scale::new(encoder, period)?)
+            }
+        }
+    )+};
+}
+
+one_kind! {
+    Ramp Profile ramp;
+    Trapezoid Profile trapezoid;
+    JerkLimited Profile jerk_limited;
+    MinimumJerk Profile minimum_jerk;
+    Sine Wave sine;
+    Chirp Wave chirp;
+}
+
 /// A checked path.
 ///
 /// ```
@@ -98,7 +130,7 @@ pub struct Reference<'a, T> {
 enum Kind<'a, T> {
     Profile(Profile<T>),
     Wave(Wave<T>),
-    Table(Table<'a>, table::Scale<T>),
+    Table(Tabulated<'a, T>),
 }
 
 impl<'a, T: Real> Reference<'a, T> {
@@ -112,23 +144,16 @@ impl<'a, T: Real> Reference<'a, T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        let seconds = period.period::<T>()?;
-        let scale = Scale { counts_per_radian: encoder.counts_per_radian(), period: seconds };
+        let scale = Scale::new(encoder, period)?;
         let kind = match p {
-            ReferenceParams::Hold => Kind::Profile(Profile::ramp(T::ZERO, scale)),
-            ReferenceParams::Ramp(p) => {
-                p.check_rows()?;
-                Kind::Profile(Profile::ramp(Ramp::RATE.require(p.rate, scale.holds_rate(p.rate))?, scale))
-            }
+            ReferenceParams::Hold => Kind::Profile(Profile::at_rate(T::ZERO, scale)),
+            ReferenceParams::Ramp(p) => Kind::Profile(Profile::ramp(p, scale)?),
             ReferenceParams::Trapezoid(p) => Kind::Profile(Profile::trapezoid(p, scale)?),
             ReferenceParams::JerkLimited(p) => Kind::Profile(Profile::jerk_limited(p, scale)?),
             ReferenceParams::MinimumJerk(p) => Kind::Profile(Profile::minimum_jerk(p, scale)?),
             ReferenceParams::Sine(p) => Kind::Wave(Wave::sine(p, scale)?),
             ReferenceParams::Chirp(p) => Kind::Wave(Wave::chirp(p, scale)?),
-            ReferenceParams::Table(table) => {
-                table.check_points()?;
-                Kind::Table(*table, table::Scale::new(encoder, period))
-            }
+            ReferenceParams::Table(p) => Kind::Table(Tabulated::new(p, encoder, period)?),
         };
         Ok(Reference { kind, start })
     }
@@ -139,7 +164,7 @@ impl<'a, T: Real> Reference<'a, T> {
         let target = match &self.kind {
             Kind::Profile(p) => p.at(tick),
             Kind::Wave(w) => w.at(tick),
-            Kind::Table(t, scale) => t.scaled(tick, scale),
+            Kind::Table(t) => t.at(tick),
         };
         Target { position: target.position.plus(self.start), ..target }
     }

@@ -1,9 +1,10 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
+use super::Ramp;
 use super::scale::{Scale, advance};
 use super::target::Target;
 use crate::params::{Range, Table};
-use crate::{FixedCounts, ParamError, Real};
+use crate::{FixedCounts, ParamError, Planned, Real};
 
 crate::params! {
     /// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
@@ -116,13 +117,18 @@ const PIECES: usize = 8;
 
 /// A path of polynomial pieces that begins at position 0; unused ones repeat the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Profile<T> {
+pub struct Profile<T> {
     pieces: [Piece<T>; PIECES],
     scale: Scale<T>,
 }
 
 impl<T: Real> Profile<T> {
-    pub(super) fn ramp(rate: T, scale: Scale<T>) -> Self {
+    pub(super) fn ramp(p: &Ramp<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
+        Ok(Profile::at_rate(Ramp::RATE.require(p.rate, scale.holds_rate(p.rate))?, scale))
+    }
+
+    pub(super) fn at_rate(rate: T, scale: Scale<T>) -> Self {
         let first = Piece { rate: scale.rate(rate), velocity: rate, ..Piece::resting(0, FixedCounts(0)) };
         Profile { pieces: [first; PIECES], scale }
     }
@@ -210,6 +216,13 @@ impl<T: Real> Profile<T> {
             velocity: piece.velocity(tau),
             acceleration: piece.acceleration(tau),
         }
+    }
+}
+
+impl<T: Real> Planned<T> for Profile<T> {
+    #[inline]
+    fn target(&self, tick: u64) -> Target<T> {
+        self.at(tick)
     }
 }
 

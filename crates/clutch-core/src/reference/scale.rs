@@ -1,6 +1,6 @@
 //! Radians and seconds in counts and ticks.
 
-use crate::{FixedCounts, Real};
+use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 
 /// Factors that turn radians and seconds into counts and ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,10 @@ pub(super) struct Scale<T> {
 const RATE_BITS: u32 = 40;
 
 impl<T: Real> Scale<T> {
+    pub(super) fn new(encoder: Encoder, period: Micros) -> Result<Self, ParamError<T>> {
+        Ok(Scale { counts_per_radian: encoder.counts_per_radian(), period: period.period()? })
+    }
+
     /// rad/s to the nearest multiple of 2⁻⁴⁰ counts per tick.
     pub(super) fn rate(&self, radians_per_second: T) -> i64 {
         let counts_per_tick = radians_per_second * self.counts_per_radian * self.period;

@@ -1,8 +1,9 @@
 //! A path through points in time.
 
+use super::OneKind;
 use super::target::Target;
 use crate::params::{self, Editor, Kind, Leaf, Range, Unit};
-use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+use crate::{Encoder, FixedCounts, Micros, ParamError, Planned, Real};
 
 /// A point of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,14 +70,48 @@ impl<'a, T: Real> Leaf<T> for &'a [Knot] {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scale<T> {
+struct Scale<T> {
     radians_per_count: T,
     period_us: u64,
 }
 
 impl<T: Real> Scale<T> {
-    pub(super) fn new(encoder: Encoder, period: Micros) -> Self {
+    fn new(encoder: Encoder, period: Micros) -> Self {
         Scale { radians_per_count: encoder.radians_per_count(), period_us: u64::from(period.0) }
+    }
+}
+
+/// A checked path through points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tabulated<'a, T> {
+    table: Table<'a>,
+    scale: Scale<T>,
+}
+
+impl<'a, T: Real> Tabulated<'a, T> {
+    pub(super) fn new(table: &Table<'a>, encoder: Encoder, period: Micros) -> Result<Self, ParamError<T>> {
+        table.check_points()?;
+        Ok(Tabulated { table: *table, scale: Scale::new(encoder, period) })
+    }
+
+    pub(super) fn at(&self, tick: u64) -> Target<T> {
+        self.table.scaled(tick, &self.scale)
+    }
+}
+
+impl<T: Real> Planned<T> for Tabulated<'_, T> {
+    #[inline]
+    fn target(&self, tick: u64) -> Target<T> {
+        self.at(tick)
+    }
+}
+
+impl<'a, T: Real> OneKind<T> for Table<'a> {
+    type Path = Tabulated<'a, T>;
+
+    fn path(&self, encoder: Encoder, period: Micros) -> Result<Tabulated<'a, T>, ParamError<T>> {
+        period.period::<T>()?;
+        Tabulated::new(self, encoder, period)
     }
 }
 
@@ -143,7 +178,7 @@ impl<'a> Table<'a> {
     }
 
     /// Checks the points; the value of an error is the number (from 0) of the point.
-    pub(super) fn check_points<T: Real>(&self) -> Result<(), ParamError<T>> {
+    fn check_points<T: Real>(&self) -> Result<(), ParamError<T>> {
         Table::NOT_EMPTY.require(T::ZERO, !self.knots.is_empty())?;
         let rising = |w: &[Knot]| matches!(w, [a, b] if a.time_us < b.time_us);
         if let Some(i) = self.knots.windows(2).position(|w| !rising(w)) {
@@ -231,7 +266,7 @@ impl<'a> Table<'a> {
     }
 
     #[inline(never)]
-    pub(super) fn scaled<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
+    fn scaled<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
         self.on(tick, scale, |_, interval, us| interval.along(us), |point| self.slope(point))
     }
 

@@ -3,7 +3,7 @@
 use super::scale::{Scale, advance};
 use super::target::Target;
 use crate::params::{Range, Table};
-use crate::{ParamError, Real, sin_cos_turns};
+use crate::{ParamError, Planned, Real, sin_cos_turns};
 
 crate::params! {
     /// A sine on a ramp: `rate · t + amplitude · [sin(2π f t + phase) − sin(phase)]`.
@@ -61,8 +61,9 @@ crate::params! {
     }
 }
 
+/// A checked path of a sine on a ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Wave<T> {
+pub struct Wave<T> {
     rate: i64,
     velocity: T,
     amplitude: T,
@@ -78,6 +79,13 @@ pub(super) struct Wave<T> {
     from: T,
     rise: T,
     scale: Scale<T>,
+}
+
+impl<T: Real> Planned<T> for Wave<T> {
+    #[inline]
+    fn target(&self, tick: u64) -> Target<T> {
+        self.at(tick)
+    }
 }
 
 impl<T: Real> Wave<T> {

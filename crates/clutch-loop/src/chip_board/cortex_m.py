@@ -6,14 +6,14 @@ Here is what Unicorn leaves out. Code takes no time. Time goes on only while the
 or spins for ever. An interrupt is taken when the core sleeps, when a handler returns, and after an instruction that may
 unmask it. Bytes that the serial line sends are gone at once; bytes for its receiver come when the host gives them.
 
-Not modelled: pins and what is analogue, process stack (PSP), memory protection but for regions that nobody may access,
-breakpoints. A register without a model is plain memory.
+Not modelled: pins, but for a board's button and lamp, and what is analogue; process stack (PSP), memory protection but
+for regions that nobody may access, breakpoints. A register without a model is plain memory.
 
 Protocol, little-endian. The host writes requests to standard input, and gets an answer to each on standard output:
 
     request   now_ns u64     time to which the chip is to go on, doing what falls due on the way
               counts i32     encoder's counts from now on
-              faults u32     faults, see Fault
+              faults u32     faults, and the button: see Fault
               length u16     and so many bytes for the receiver of the line
     answer    next_ns u64    time at which the chip wants to run next; all ones if it never does
               code u16       output of the converter
@@ -61,6 +61,7 @@ class Fault:
     AMPLIFIER = 1 << 10  # what is behind the converter gives 0 V
     STACK_OVERFLOW = 1 << 11  # a function calls itself without an end
     PANIC = 1 << 12  # the program comes to its panic handler
+    PRESSED = 1 << 30  # no fault: the board's button is pressed
     METERED = 1 << 31  # no fault: the instructions of this request count
 
 
@@ -76,6 +77,7 @@ class Flag:
     FLOATING = 1 << 6  # the converter decides nothing: what it leaves to the wiring does
     STOPPED = 1 << 7  # the core has no clock
     GUARDED = 1 << 8  # it is in HardFault because of memory that nobody may access
+    LAMP = 1 << 9  # the board's lamp is lit
 
 
 NEVER = (1 << 64) - 1
@@ -344,6 +346,10 @@ class Chip(ABC):
     @abstractmethod
     def floats(self) -> bool:
         """True if the converter leaves its output to the wiring."""
+
+    def lamp(self) -> bool:
+        """True if the board's lamp is lit."""
+        return False
 
     def share(self, size: int, rights: int, *where: int) -> Any:
         memory = (ctypes.c_char * size)()
@@ -653,6 +659,7 @@ class Chip(ABC):
         flags |= Flag.LOCKUP if self.locked else 0
         flags |= 0 if self.core_hz() else Flag.STOPPED
         flags |= Flag.FLOATING if self.floats() else 0
+        flags |= Flag.LAMP if self.lamp() else 0
         return flags
 
     def answer(self, now_ns: int, counts: int, faults: int, data: bytes) -> tuple[int, int, int, int, bytes]:

@@ -8,12 +8,15 @@
 //! | `process` | the process that carries it |
 //! | `faults` | faults of the chip |
 //! | `session` | a session with it |
+//! | `alone` | a session with an image that has no host |
 
+mod alone;
 mod faults;
 mod kind;
 mod process;
 mod session;
 
+pub use alone::{AloneReport, AloneSession};
 pub use faults::{ChipFault, ChipFaultError, ChipFaultKind};
 pub use kind::ChipKind;
 pub use process::{ChipError, Counted, MODULE, no_engine};
@@ -55,7 +58,12 @@ pub struct ChipBoard {
     first_hit_ns: Option<u64>,
     resets: u32,
     events: Vec<Event>,
+    /// The board's button is pressed; none, if a host gives consent.
+    button: Option<bool>,
 }
+
+/// A bit beside those of the faults: the board's button is pressed, `Fault.PRESSED` in the model.
+const PRESSED: u32 = 1 << 30;
 
 /// A bit beside those of the faults: instructions of this request are counted, `Fault.METERED` in the model.
 const METERED: u32 = 1 << 31;
@@ -104,6 +112,7 @@ impl ChipBoard {
             first_hit_ns: None,
             resets: 0,
             events: Vec::new(),
+            button: None,
         };
         board.exchange(0, &[], &mut Outbox::default())?;
         board.volts_before = board.volts_now();
@@ -113,6 +122,18 @@ impl ChipBoard {
     /// Begins a fault with the next exchange.
     pub fn inject(&mut self, kind: ChipFaultKind) {
         self.faults.push(ChipFault { kind, at: None });
+    }
+
+    /// Presses the board's button, or lets it go, from the next exchange on: consent is the button's, and the lamp tells
+    /// whether the board drives.
+    pub fn press(&mut self, pressed: bool) {
+        self.button = Some(pressed);
+    }
+
+    /// True if the board's lamp is lit.
+    #[must_use]
+    pub fn lamp(&self) -> bool {
+        self.last.flags.has(Flags::LAMP)
     }
 
     /// Ends all faults with the next exchange.
@@ -181,7 +202,8 @@ impl ChipBoard {
             self.first_hit_ns.get_or_insert(now_ns);
         }
         // The chip's work under control is counted, and nothing else.
-        bits | if self.state == BoardState::Running { METERED } else { 0 }
+        let metered = if self.state == BoardState::Running { METERED } else { 0 };
+        bits | metered | if self.button == Some(true) { PRESSED } else { 0 }
     }
 
     /// The rig where it will be at a time, and what happens until then. It moves when the chip looks at it or acts on it,
@@ -203,6 +225,11 @@ impl ChipBoard {
         let before = self.volts_now();
         let faults = self.active(now_ns);
         self.last = self.chip.exchange(now_ns, ahead.counts().0, faults, bytes)?;
+        if self.button.is_some() && self.lamp() && self.armed_ns.is_none() {
+            // This sample is the run's first.
+            (self.armed_ns, self.moved_ns) = (Some(now_ns), Some(now_ns));
+            self.state = BoardState::Running;
+        }
         let sampling = self.started_ns.is_some() || self.moved_ns.is_some();
         let sampled = self.last.flags.has(Flags::SAMPLED) && sampling;
         if self.last.resets != self.resets {

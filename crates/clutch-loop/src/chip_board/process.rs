@@ -112,6 +112,7 @@ impl Flags {
     pub(super) const FLOATING: u16 = 1 << 6;
     pub(super) const STOPPED: u16 = 1 << 7;
     pub(super) const GUARDED: u16 = 1 << 8;
+    pub(super) const LAMP: u16 = 1 << 9;
 
     pub(super) const fn has(self, flag: u16) -> bool {
         self.0 & flag != 0

@@ -19,6 +19,7 @@ from unicorn import unicorn_const as uc_const
 
 HSI_HZ, HSE_HZ, LSI_HZ = 16_000_000, 24_000_000, 32_000
 ROM = 0x1FFF_0000  # system memory
+GPIOA, GPIOC = 0x4800_0000, 0x4800_0800
 
 
 class Registers(Block):
@@ -620,8 +621,11 @@ class Stm32g474(Chip):
         return bool(self.rcc[at] >> bit & 1)
 
     def begin(self) -> None:
-        for at in [0x4000_7000, 0x4002_2000]:
+        for at in [0x4000_7000, 0x4002_2000, GPIOA, GPIOC]:
             self.uc.mem_write(at, bytes(0x400))
+        self.uc.mem_write(GPIOA, struct.pack("<I", 0xABFF_FFFF))  # MODER: analogue, but for the debugger's pins
+        self.uc.mem_write(GPIOC, struct.pack("<I", 0xFFFF_FFFF))
+        self.set_button()
         self.uc.mem_write(0x4000_7080, b"\x00\x01")  # PWR_CR5.R1MODE
         self.load_options()
         stack, self.pc = struct.unpack("<II", self.uc.mem_read(0x0800_0000, 8))
@@ -652,8 +656,20 @@ class Stm32g474(Chip):
             self.timer.rebase()
         super().set_faults(faults)
         self.load_options()
+        self.set_button()
         if new & Fault.CRYSTAL_DEAD:
             self.rcc.crystal_died()
+
+    def set_button(self) -> None:
+        """GPIOC_IDR, bit 13, where the pin is an input."""
+        moder, _, _, _, levels = struct.unpack("<5I", self.uc.mem_read(GPIOC, 20))
+        pressed = self.faults & Fault.PRESSED and not moder >> 26 & 3
+        self.uc.mem_write(GPIOC + 0x10, struct.pack("<I", levels & ~(1 << 13) | bool(pressed) << 13))
+
+    def lamp(self) -> bool:
+        """Bit 5 of GPIOA_ODR, where the pin is an output."""
+        moder, _, _, _, _, levels = struct.unpack("<6I", self.uc.mem_read(GPIOA, 24))
+        return bool(levels >> 5 & 1) and moder >> 10 & 3 == 1
 
     def core_hz(self) -> int:
         return self.rcc.core_hz

@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "the tests' names say what holds")]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
+mod alone;
 mod board;
 mod board_controller;
 mod board_program;

@@ -1,0 +1,270 @@
+//! A session with an image that has no host: its button is pressed, its lamp watched, and each of its codes compared with
+//! that of the same controller in this process.
+
+use super::{ChipBoard, ChipFault, Counted};
+use crate::clearance::check;
+use crate::from_scenario::{self, BuiltRun};
+use crate::lockstep_board::InProcessBoard;
+use crate::lockstep_host::lockstep_host;
+use crate::lockstep_session::LockstepError;
+use crate::session::SessionError;
+use crate::virtual_time::{VirtualBoard, VirtualError, VirtualLoop, VirtualOptions};
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{FixedCounts, Planned};
+use clutch_log::CommandRecord;
+use clutch_node::Outbox;
+use clutch_sim::engine::{Event, Motion};
+use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_sim::{Metrics, Scenario};
+use std::path::{Path, PathBuf};
+
+/// Time for which the button is seen let go before it is pressed, and the longest that a press may need, ns.
+const BEFORE_NS: u64 = 60_000_000;
+/// Dark for so long is behind the last flash, ns.
+const PAUSE_NS: u64 = 500_000_000;
+/// Time in which any number of flashes has been seen, ns.
+const FLASHES_NS: u64 = 10_000_000_000;
+
+/// The outcome of a session with an image that has no host.
+#[derive(Clone, Debug)]
+pub struct AloneReport {
+    /// Codes under control, tick by tick.
+    pub codes: Vec<u16>,
+    /// Those of the same controller in this process.
+    pub expected: Vec<u16>,
+    /// Figures of the shaft's true motion under control.
+    pub metrics: Metrics,
+    /// Flashes of the lamp after the end: one for the end of the path, the number of the cause for a fault; none if the
+    /// board does not flash.
+    pub flashes: u32,
+    /// The code that the converter has at the end.
+    pub last_code: u16,
+    /// Resets of the chip since power-up.
+    pub resets: u32,
+    /// True if the chip's core spins, has no clock or has locked up at the end.
+    pub dead: bool,
+    /// True if the wiring alone decides the output at the end.
+    pub floating: bool,
+    /// Numbers of instructions, if they were asked for.
+    pub counted: Option<Counted>,
+}
+
+impl AloneReport {
+    /// The first tick with another code than in this process, of those that both have.
+    #[must_use]
+    pub fn differs(&self) -> Option<usize> {
+        self.codes.iter().zip(&self.expected).position(|(here, there)| here != there)
+    }
+
+    /// True if the path was followed to its end, and nothing was reset on the way.
+    #[must_use]
+    pub fn done(&self) -> bool {
+        self.resets == 0 && self.flashes == 1 && self.codes.len() == self.expected.len()
+    }
+
+    /// The cause of a fault, by the lamp; none at the end of the path.
+    #[must_use]
+    pub fn fault(&self) -> Option<Cause> {
+        // One flash is an end that was wanted: no sample is lost where there is no line.
+        u8::try_from(self.flashes).ok().filter(|n| *n > 1).and_then(Cause::from_u8)
+    }
+}
+
+/// A checked session with an image that has no host.
+#[derive(Clone, Debug)]
+pub struct AloneSession {
+    scenario: Scenario,
+    faults: Vec<ChipFault>,
+    count: Option<PathBuf>,
+    changed: bool,
+}
+
+/// The run on its way.
+struct Course<'a> {
+    board: ChipBoard,
+    now_ns: u64,
+    path: &'a dyn Planned<f32>,
+    period: f64,
+    radians_per_count: f64,
+    origin: FixedCounts,
+    figures: MetricsBuilder,
+    codes: Vec<u16>,
+    /// Error, velocity, time by the rig's clock and motion at the last sample.
+    waiting: Option<(f64, f64, f64, Motion)>,
+}
+
+impl AloneSession {
+    /// Checks everything that can be checked without the image.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn new(
+        scenario: Scenario,
+        uncertified: bool,
+        faults: Vec<ChipFault>,
+        count: Option<PathBuf>,
+    ) -> Result<Self, SessionError> {
+        let single = from_scenario::in_single_precision(&scenario)?;
+        let changed = single.is_some();
+        let scenario = single.unwrap_or(scenario);
+        check(&scenario, None, uncertified, None)?;
+        Ok(AloneSession { scenario, faults, count, changed })
+    }
+
+    /// The scenario as it will run.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The change made in the scenario for the board's sake.
+    #[must_use]
+    pub fn note(&self) -> Option<&'static str> {
+        self.changed.then_some(from_scenario::SINGLE_PRECISION)
+    }
+
+    /// Powers up a board with an image, presses its button, and lets it run to the path's end or to a fault.
+    ///
+    /// # Errors
+    /// The chip does not start or ends; no press begins a run.
+    pub fn run(&self, image: &Path) -> Result<AloneReport, LockstepError> {
+        let scenario = &self.scenario;
+        let expected = self.expected()?;
+        let spec = scenario.spec();
+        let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
+        let period = spec.period.seconds();
+        let board = ChipBoard::start(image, scenario, &self.faults, self.count.as_deref())?;
+        let radians_per_count = board.rig().rig().encoder.radians_per_count();
+        let mut course = Course {
+            board,
+            now_ns: 0,
+            path: &path,
+            period,
+            radians_per_count,
+            origin: FixedCounts(0),
+            figures: MetricsBuilder::new(period, spec.run.settle),
+            codes: Vec::new(),
+            waiting: None,
+        };
+        course.begin()?;
+        course.drive(expected.len())?;
+        let flashes = course.flashes()?;
+        let Course { board, figures, codes, .. } = course;
+        let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
+        let last_code = board.code().0;
+        Ok(AloneReport {
+            codes,
+            expected,
+            metrics: figures.finish(),
+            flashes,
+            last_code,
+            resets,
+            dead,
+            floating,
+            counted: board.end().map_err(VirtualError::from)?,
+        })
+    }
+
+    /// The codes of the same run on a controller in this process.
+    fn expected(&self) -> Result<Vec<u16>, LockstepError> {
+        let scenario = &self.scenario;
+        let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
+        let (ticks, run) = (built.ticks + 1, &scenario.spec().run);
+        let duration = run.duration + 0.1;
+        let params =
+            VirtualOptions { record: true, duration, ticks, settle: run.settle, ..VirtualOptions::default() };
+        let station =
+            lockstep_host(scenario, &built, InProcessBoard::default(), ticks).map_err(SessionError::from)?;
+        let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
+        let ran = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from)?.run(&path)?;
+        let (_, commands) = ran.samples_and_commands();
+        // In the last period the run ends.
+        let under_control = |c: &&CommandRecord| c.state == State::Running as u8 && c.tick < built.ticks;
+        Ok(commands.iter().filter(under_control).map(|c| c.code).collect())
+    }
+}
+
+impl Course<'_> {
+    /// The chip goes on to what it does next, but no further than to a time.
+    fn step(&mut self, until_ns: u64) -> Result<(), VirtualError> {
+        self.now_ns = self.board.next_ns().map_or(until_ns, |next| next.clamp(self.now_ns, until_ns));
+        self.board.step(self.now_ns, &mut Outbox::default())
+    }
+
+    /// The button: let go for a while, then pressed until the lamp is lit.
+    fn begin(&mut self) -> Result<(), VirtualError> {
+        self.board.press(false);
+        while self.now_ns < BEFORE_NS {
+            self.step(BEFORE_NS)?;
+        }
+        self.board.press(true);
+        while !self.board.lamp() {
+            if self.now_ns >= 2 * BEFORE_NS {
+                let why = "a press of its button does not light its lamp for good";
+                return Err(VirtualError::Refused(why.to_owned()));
+            }
+            self.step(2 * BEFORE_NS)?;
+        }
+        self.origin = FixedCounts::from_counts(i64::from(self.board.rig().counts().0));
+        self.sampled();
+        self.board.press(false);
+        Ok(())
+    }
+
+    /// To the end of control, but for no more than some ticks beyond those that are expected.
+    fn drive(&mut self, expected: usize) -> Result<(), VirtualError> {
+        let mut samples = self.board.samples();
+        while self.codes.len() < expected + 10 {
+            self.step(u64::MAX)?;
+            if !self.board.lamp() {
+                self.measure();
+                break;
+            }
+            if self.board.samples() != samples {
+                samples = self.board.samples();
+                self.measure();
+                self.sampled();
+            }
+        }
+        Ok(())
+    }
+
+    /// A sample has its code.
+    fn sampled(&mut self) {
+        let rig = self.board.rig();
+        let target = self.path.target(self.codes.len() as u64).position.plus(self.origin);
+        let target = target.minus::<f64>(FixedCounts(0)) * self.radians_per_count;
+        let shaft = rig.shaft();
+        self.waiting = Some((target - shaft.position, shaft.velocity, rig.time(), shaft.motion));
+        self.codes.push(self.board.code().0);
+    }
+
+    /// The period behind the last sample is over.
+    fn measure(&mut self) {
+        let events = self.board.take_events();
+        let Some((error, velocity, rig_time, motion)) = self.waiting.take() else { return };
+        let time = (self.codes.len() - 1) as f64 * self.period;
+        self.figures.sample(time, MetricsSample { error, velocity, voltage: self.board.volts() });
+        let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
+        let events: Vec<Event> = events.iter().map(of_run).collect();
+        self.figures.period(time, motion == Motion::Stuck, &events);
+    }
+
+    /// The flashes of the lamp until it pauses.
+    fn flashes(&mut self) -> Result<u32, VirtualError> {
+        let (end_ns, mut flashes, mut changed_ns, mut lit) =
+            (self.now_ns + FLASHES_NS, 0, self.now_ns, self.board.lamp());
+        // A program that begins anew flashes nothing.
+        while self.board.resets() == 0
+            && self.now_ns < end_ns
+            && !(flashes > 0 && !lit && self.now_ns - changed_ns > PAUSE_NS)
+        {
+            self.step(end_ns)?;
+            if self.board.lamp() != lit {
+                (lit, changed_ns) = (!lit, self.now_ns);
+                flashes += u32::from(lit);
+            }
+        }
+        Ok(flashes)
+    }
+}

@@ -1,0 +1,327 @@
+//! A controller without a host: consent by a button, its end, faults; codes are those of any other supervisor's.
+
+use crate::desk::{BOARD, PATHS, Plan};
+use clutch_core::law::{Pd, PdParams};
+use clutch_core::reference::{Interpolation, Knot, OneKind, Ramp, Reference, ReferenceParams, Table};
+use clutch_core::supervisor::{BoardMode, Cause, Sample, State};
+use clutch_core::{
+    BeginningAt, Counts, DacCode, Encoder, FixedCounts, Micros, ParamError, Planned, Servo, SupervisorState,
+    Target,
+};
+use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, Hardware};
+
+const BOOT_CODE: u16 = BOARD.boot_code;
+
+/// A board in whose hands a shaft does what a test says.
+#[derive(Default)]
+struct Desk {
+    now_us: u64,
+    counts: i32,
+    encoder_fault: bool,
+    code: u16,
+    fed: u32,
+}
+
+impl Hardware for Desk {
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+    fn counts(&mut self) -> Counts {
+        Counts(self.counts)
+    }
+    fn encoder_fault(&self) -> bool {
+        self.encoder_fault
+    }
+    fn converter_fault(&self) -> bool {
+        false
+    }
+    fn put_out(&mut self, code: DacCode) {
+        self.code = code.0;
+    }
+    fn feed_watchdog(&mut self) {
+        self.fed += 1;
+    }
+    fn send(&mut self, _frames: &[u8]) -> bool {
+        panic!("a controller without a host sends nothing")
+    }
+    fn cycles(&self) -> u32 {
+        0
+    }
+}
+
+type OnRamp = Alone<Pd<f32>, Ramp<f32>>;
+
+fn run(plan: &Plan) -> AloneRun<Pd<f32>, Ramp<f32>> {
+    let ReferenceParams::Ramp(path) = plan.reference else { panic!("a ramp") };
+    AloneRun {
+        servo: plan.servo,
+        law: PdParams::default(),
+        supervisor: plan.limits,
+        bounds: plan.bounds,
+        path,
+        start: plan.start,
+        ticks: plan.ticks,
+        watchdog: plan.watchdog,
+    }
+}
+
+/// Counts of a shaft that is driven, period by period: 54 °/s, not quite evenly.
+const STEPS: [i32; 4] = [3, 1, 5, 3];
+
+/// A controller and its board, whose shaft moves once it is driven.
+struct Bench {
+    alone: OnRamp,
+    desk: Desk,
+    pressed: bool,
+}
+
+impl Bench {
+    fn new(plan: &Plan) -> Bench {
+        let alone = Alone::new(&run(plan), &BOARD).unwrap();
+        Bench { alone, desk: Desk { counts: 70, ..Desk::default() }, pressed: false }
+    }
+
+    fn driving(&self) -> bool {
+        matches!(self.alone.state().state(), State::Armed | State::Running)
+    }
+
+    /// Periods; the code of the last.
+    fn pass(&mut self, periods: u32) -> u16 {
+        for _ in 0..periods {
+            if self.driving() {
+                self.desk.counts += STEPS[self.desk.now_us as usize / 1000 % STEPS.len()];
+            }
+            self.desk.now_us += 1000;
+            let fed = self.desk.fed;
+            self.alone.tick(&mut self.desk, self.pressed);
+            assert_eq!(self.desk.fed, fed + 1, "the watchdog is fed once");
+        }
+        self.desk.code
+    }
+
+    /// A press of some periods, and the button let go for long.
+    fn press(&mut self, periods: u32) {
+        self.pressed = true;
+        self.pass(periods);
+        self.pressed = false;
+        self.pass(20);
+    }
+
+    fn state(&self) -> (State, Cause) {
+        (self.alone.state().state(), self.alone.state().cause())
+    }
+}
+
+#[test]
+fn nothing_but_a_press_after_the_button_was_let_go_begins_a_run() {
+    let mut bench = Bench::new(&Plan::new());
+    // Held at power-up, for ever.
+    bench.pressed = true;
+    assert_eq!(bench.pass(1000), BOOT_CODE);
+    assert_eq!(bench.state(), (State::Ready, Cause::None));
+    // Let go, and a contact that bounces for 15 ms at a time.
+    bench.pressed = false;
+    bench.pass(100);
+    for _ in 0..50 {
+        bench.pressed = true;
+        bench.pass(15);
+        bench.pressed = false;
+        bench.pass(1);
+    }
+    assert_eq!((bench.state(), bench.desk.code), ((State::Ready, Cause::None), BOOT_CODE));
+    // The twentieth period of a press; the sample of that very period is the first that is answered.
+    bench.pass(20);
+    bench.pressed = true;
+    bench.pass(19);
+    assert_eq!(bench.state().0, State::Ready);
+    bench.pass(1);
+    assert_eq!((bench.state().0, bench.alone.state().tick()), (State::Running, 0));
+    // The press goes on, the run too.
+    bench.pass(60);
+    assert_eq!((bench.state().0, bench.alone.state().tick()), (State::Running, 60));
+}
+
+/// The same samples, given to a supervisor with the law of the list.
+#[test]
+fn its_codes_are_those_of_a_supervisor_with_the_law_of_the_list() {
+    for start in [0, 4711] {
+        let plan = Plan { start: FixedCounts(start), ticks: 300, ..Plan::new() };
+        let mut bench = Bench::new(&plan);
+        bench.pass(50);
+        bench.pressed = true;
+        bench.pass(19);
+        let servo = Servo::<f32>::new(&plan.servo).unwrap();
+        let supervisor = plan.supervisor();
+        let path = Reference::new(&plan.reference, plan.start, Encoder::PAPER, servo.period()).unwrap();
+        let path = |tick| path.at(tick);
+        let mut state = SupervisorState::default();
+        supervisor.connect(&mut state);
+        supervisor.arm(&mut state, DacCode(BOOT_CODE));
+        let mut codes = std::collections::BTreeSet::new();
+        for tick in 0..300 {
+            bench.pass(1);
+            let counts = Counts(bench.desk.counts);
+            let sample = Sample {
+                sequence: tick,
+                time: Micros(bench.desk.now_us as u32),
+                counts,
+                board: BoardMode::Driving,
+                encoder_fault: false,
+                converter_fault: false,
+                command_late: false,
+                superseded: false,
+                lateness: Micros(0),
+            };
+            let origin = FixedCounts::from_counts(if tick == 0 { i64::from(counts.0) } else { 70 });
+            let planned = BeginningAt { planned: &path, origin };
+            let cycle = supervisor.sample(&servo, &mut state, &sample, planned);
+            let answer = cycle.answer.unwrap_or_else(|| panic!("tick {tick}: {cycle:?}")).0;
+            codes.insert(answer);
+            if tick < 299 {
+                assert_eq!(bench.desk.code, answer, "tick {tick} from {start}");
+            }
+        }
+        assert!(codes.len() > 20, "{} codes", codes.len());
+        // After the last tick the safe output holds.
+        assert_eq!(bench.state(), (State::Holding, Cause::Done));
+        assert_eq!(bench.desk.code, supervisor.safe_codes().hold.0);
+    }
+}
+
+#[test]
+fn a_press_ends_a_run_at_once_and_the_next_two_begin_another() {
+    let mut bench = Bench::new(&Plan::new());
+    let hold = Plan::new().supervisor().safe_codes().hold.0;
+    bench.pass(30);
+    bench.press(25);
+    bench.pass(50);
+    assert_eq!(bench.state().0, State::Running);
+    bench.pressed = true;
+    assert_eq!(bench.pass(1), hold);
+    assert_eq!(bench.state(), (State::Holding, Cause::Operator));
+    // That press is used up, however long it lasts.
+    bench.pass(500);
+    bench.pressed = false;
+    bench.pass(30);
+    assert_eq!(bench.state().0, State::Holding);
+    bench.press(25);
+    assert_eq!((bench.state().0, bench.desk.code), (State::Ready, hold));
+    // From where the shaft is by now.
+    let here = i64::from(bench.desk.counts);
+    bench.press(25);
+    assert_eq!((bench.state().0, bench.alone.origin()), (State::Running, FixedCounts::from_counts(here)));
+}
+
+#[test]
+fn a_fault_latches_and_its_lamp_counts_the_cause() {
+    let mut bench = Bench::new(&Plan::new());
+    assert!(!bench.alone.lamp());
+    bench.pass(30);
+    bench.press(25);
+    assert!(bench.alone.lamp());
+    bench.desk.encoder_fault = true;
+    bench.pass(1);
+    bench.desk.encoder_fault = false;
+    assert_eq!(bench.state(), (State::Faulted, Cause::Board));
+    let mut flashes = |periods| {
+        let (mut lit, mut count) = (false, 0);
+        for _ in 0..periods {
+            bench.pass(1);
+            count += u32::from(lit && !bench.alone.lamp());
+            lit = bench.alone.lamp();
+        }
+        count
+    };
+    // 12 of 0.4 s each, and a pause: as many in the same time behind them.
+    let all = (2 * Cause::Board as u32 + 2) * 200;
+    assert_eq!((flashes(all), flashes(all)), (Cause::Board as u32, Cause::Board as u32));
+    assert_eq!(bench.state().0, State::Faulted);
+    bench.press(25);
+    assert_eq!((bench.state(), bench.alone.lamp()), ((State::Ready, Cause::None), false));
+}
+
+#[test]
+fn a_law_that_gives_no_codes_is_ended_by_the_watchdog() {
+    let mut plan = Plan::new();
+    // A count that no shaft can have does not end control, and is not answered.
+    plan.limits.limits.jumps = 128;
+    let mut bench = Bench::new(&plan);
+    bench.pass(30);
+    bench.press(25);
+    let before = bench.desk.code;
+    for _ in 0..2 {
+        bench.desk.counts += 5000;
+        assert_eq!(bench.pass(1), before, "the code stays");
+    }
+    bench.desk.counts += 5000;
+    let hold = plan.supervisor().safe_codes().hold.0;
+    assert_eq!(bench.pass(1), hold);
+    assert_eq!(bench.state(), (State::Faulted, Cause::Board));
+}
+
+#[test]
+fn a_run_of_another_board_is_refused() {
+    let of = |board: BoardParams| Alone::new(&run(&Plan::new()), &board).err();
+    assert_eq!(of(BOARD), None);
+    let refused = of(BoardParams { counts_per_rev: 8000, ..BOARD });
+    assert_eq!(refused, Some(AloneMisfit::Encoder(8000)));
+    for board in [
+        BoardParams { dac_bits: 16, ..BOARD },
+        BoardParams { dac_lowest_mv: 0, ..BOARD },
+        BoardParams { dac_highest_mv: 10_023, ..BOARD },
+    ] {
+        assert_eq!(of(board), Some(AloneMisfit::Converter), "{board:?}");
+    }
+    let slow = of(BoardParams { period_min_us: 2000, ..BOARD });
+    assert_eq!(slow, Some(AloneMisfit::Period(Micros(1000))));
+    let mut law = run(&Plan::new());
+    law.law.kp = -1.0;
+    let refused = Alone::new(&law, &BOARD).err();
+    assert!(matches!(refused, Some(AloneMisfit::Run(ParamError { value: -1.0, .. }))), "{refused:?}");
+    // Beyond what the converter gives: nothing clips unseen.
+    let mut servo = run(&Plan::new());
+    servo.servo.output.highest = 12.0;
+    assert!(matches!(Alone::new(&servo, &BOARD).err(), Some(AloneMisfit::Run(_))));
+}
+
+/// Each kind by itself has the targets of the path that may be any.
+#[test]
+fn a_path_of_one_kind_is_the_path_that_could_be_any() {
+    fn same<P: OneKind<f32>>(one: &P, any: &ReferenceParams<'static, f32>) {
+        let period = Micros(1000);
+        let any = Reference::new(any, FixedCounts(0), Encoder::PAPER, period).unwrap();
+        let one = one.path(Encoder::PAPER, period).unwrap();
+        let targets = |tick: u64| -> (Target<f32>, Target<f32>) { (one.target(tick), any.at(tick)) };
+        for tick in (0..3000).step_by(7) {
+            let (one, any) = targets(tick);
+            assert_eq!(one, any, "tick {tick}");
+        }
+    }
+    const KNOTS: &[Knot] = &[
+        Knot { time_us: 100_000, position: FixedCounts(7 << 16) },
+        Knot { time_us: 900_000, position: FixedCounts(1000 << 16) },
+        Knot { time_us: 2_000_000, position: FixedCounts(1100 << 16) },
+    ];
+    let mut kinds = 0;
+    let ramp = ReferenceParams::ramp(0.3);
+    let table = Table { knots: KNOTS, interpolation: Interpolation::Cubic };
+    for any in PATHS.iter().chain([&ramp, &ReferenceParams::Table(table)]) {
+        match any {
+            ReferenceParams::Ramp(p) => same(p, any),
+            ReferenceParams::Trapezoid(p) => same(p, any),
+            ReferenceParams::JerkLimited(p) => same(p, any),
+            ReferenceParams::MinimumJerk(p) => same(p, any),
+            ReferenceParams::Sine(p) => same(p, any),
+            ReferenceParams::Chirp(p) => same(p, any),
+            ReferenceParams::Table(p) => same(p, any),
+            ReferenceParams::Hold => {}
+        }
+        kinds += 1;
+    }
+    assert_eq!(kinds, 7);
+    same(&Ramp { rate: 0.0 }, &ReferenceParams::Hold);
+    assert!(Ramp { rate: f32::NAN }.path(Encoder::PAPER, Micros(1000)).is_err());
+    assert!(Ramp { rate: 1.0_f32 }.path(Encoder::PAPER, Micros(0)).is_err());
+    let empty = Table { knots: &[], interpolation: Interpolation::Linear };
+    assert!(OneKind::<f32>::path(&empty, Encoder::PAPER, Micros(1000)).is_err());
+}

@@ -1,0 +1,44 @@
+//! The controller without a host: its run is compiled in, and the blue button begins and ends it.
+#![no_std]
+#![no_main]
+
+// Written by `clutch scenario rust`, and compared with what that prints.
+#[rustfmt::skip]
+#[path = "../alone_run.rs"]
+mod alone_run;
+
+use clutch_node::Hardware as _;
+use clutch_nucleo_g474re::board::{self, Board, Line, READ_BACK};
+use clutch_nucleo_g474re::{button, run};
+use static_cell::StaticCell;
+
+#[embassy_executor::task]
+async fn control(mut board: Board<READ_BACK>, _line: Line) -> ! {
+    static ALONE: StaticCell<alone_run::OfRun> = StaticCell::new();
+    button::start();
+    let Ok(alone) = alone_run::controller(&board.params()) else { refuse(&mut board).await };
+    let alone = ALONE.init_with(|| alone);
+    let mut beat = run::every(alone.period_us());
+    loop {
+        beat.next().await;
+        alone.tick(&mut board, button::pressed());
+        button::light(alone.lamp());
+    }
+}
+
+/// A run that this board cannot take: the output stays the boot code, and the lamp flickers.
+#[cold]
+async fn refuse(board: &mut Board<READ_BACK>) -> ! {
+    let (mut beat, mut lit) = (run::every(board::WATCHDOG_US / 2), 0_u8);
+    loop {
+        beat.next().await;
+        board.feed_watchdog();
+        lit = lit.wrapping_add(1);
+        button::light(lit & 16 != 0);
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    run::begin(control)
+}
