@@ -1,6 +1,7 @@
 //! Scenario files: their contents, and the errors of bad ones.
 
 mod metrics;
+mod rust_run;
 
 use clutch_core::Actuator;
 use clutch_sim::progress::UNWATCHED;

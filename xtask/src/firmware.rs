@@ -56,6 +56,8 @@ pub(crate) enum Role {
     Controller,
     /// The board samples and obeys: clutch loop --port.
     Daq,
+    /// The board closes the loop without a host, with the run of firmware/nucleo-g474re/src/alone_run.rs; NUCLEO alone.
+    Alone,
 }
 
 pub(crate) fn run(verb: &Verb) -> Result<()> {
@@ -150,6 +152,10 @@ fn flash(board: Flashed, role: Role) -> Result<()> {
     let role = match role {
         Role::Controller => "controller",
         Role::Daq => "daq",
+        Role::Alone if name == "pico" => {
+            bail!("--role alone: expected with --board nucleo, which has a button")
+        }
+        Role::Alone => "alone",
     };
     let image = folder(package.1).join(format!("{name}-{role}"));
     program("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&image).run()?;

@@ -35,50 +35,98 @@ impl RustVerb {
     }
 }
 
+/// The module; each place between two @ is filled in.
+const MODULE: &str = r#"//! @name@: in SI units and radians.
+//! Written by `clutch scenario rust`, @build@.
+#![allow(unused_imports, reason = "each run has other choices")]
+
+use clutch_core::edge_timed::*;
+use clutch_core::law::*;
+use clutch_core::reference::*;
+use clutch_core::*;
+use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams};
+
+/// Law and kind of path.
+pub type OfRun = Alone<@law type@<f32>, @path type@>;
+
+/// The controller at power-up of a board.
+///
+/// # Errors
+/// The board is another than the scenario's; after a change by hand a number out of range, too.
+pub fn controller(board: &BoardParams) -> Result<OfRun, AloneMisfit> {
+    use {ActuatorParams::*, FrictionParams::*, LawParams::*, VelocityParams::*};
+    let law = @law@;
+    let servo = @servo@;
+    let supervisor = {
+        use SafeState::*;
+        @supervisor@
+    };
+    let bounds = {
+        use ActuatorKind::*;
+        @bounds@
+    };
+    let path = {
+        use Interpolation::*;
+        @path@
+    };
+    let run = AloneRun {
+        servo,
+        law,
+        supervisor,
+        bounds,
+        path,
+        start: FixedCounts(@start@),
+        ticks: @ticks@,
+        watchdog: Micros(@watchdog@),
+    };
+    Alone::new(&run, board)
+}
+"#;
+
 /// The run as a module.
 fn module(scenario: &Scenario, run: &BuiltRun<f32>) -> anyhow::Result<String> {
     let spec = scenario.spec();
-    let (name, law) = (scenario.name(), literal(&run.params.law));
-    // Each law's parameters are in a variant of its name.
-    let (law_name, of_law) = law.split_once('(').unwrap_or((&law, ""));
-    let of_law = of_law.strip_suffix(')').unwrap_or(of_law);
-    let counts_per_rev = run.params.encoder.counts_per_rev();
-    let servo = literal(&run.params).replace(&indented(&law, 1), &format!("{law_name}(law)")).replace(
-        &indented(&literal(&run.params.encoder), 1),
-        &format!("Encoder::new({counts_per_rev}).map_err(AloneMisfit::Run)?"),
-    );
+    let law = literal(&run.params.law);
+    let (law_type, of_law) = inside(&law);
+    let encoder = literal(&run.params.encoder);
+    let made = format!("Encoder::new({}).map_err(AloneMisfit::Run)?", run.params.encoder.counts_per_rev());
+    let servo = literal(&run.params)
+        .replace(&indented(&law, 1), &format!("{law_type}(law)"))
+        .replace(&indented(&encoder, 1), &made);
+    let path = literal(&spec.reference.cast::<f32>()).replace("knots: [", "knots: &[");
+    let (path_type, of_path) = match inside(&path) {
+        // A path that stays is a ramp without a rate.
+        ("Hold", _) => ("Ramp<f32>".to_owned(), "Ramp { rate: 0.0 }"),
+        ("Table", of_path) => ("Table<'static>".to_owned(), of_path),
+        (kind, of_path) => (format!("{kind}<f32>"), of_path),
+    };
     let supervisor = literal(&scenario.supervisor(scenario.safety()?).cast::<f32>());
     let bounds = literal(&scenario.supervised_bounds(&scenario.plan()?.bounds)?.cast::<f32>());
-    let path = literal(&spec.reference.cast::<f32>()).replace("knots: [", "knots: &[");
-    // A path that stays is a ramp without a rate.
-    let (path_name, of_path) = path.split_once('(').unwrap_or(("Ramp", "Ramp { rate: 0.0 })"));
-    let path_type = if path_name == "Table" { "Table<'static>" } else { &format!("{path_name}<f32>") };
-    let of_path = of_path.strip_suffix(')').unwrap_or(of_path);
     let start = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
-    // The last period is the one in which the run ends.
-    let (ticks, watchdog) = (run.ticks + 1, run.controller.watchdog.0);
-    let [of_law, servo, supervisor, bounds, of_path] =
-        [of_law, &servo, &supervisor, &bounds, of_path].map(|text| indented(text, 1));
-    Ok(format!(
-        "//! {name}: in SI units and radians.\n//! Written by `clutch scenario rust`, {BUILD}.\n\
-         #![allow(unused_imports, reason = \"each run has other choices\")]\n\n\
-         use clutch_core::law::*;\nuse clutch_core::reference::*;\nuse clutch_core::*;\nuse clutch_node::{{Alone, AloneMisfit, AloneRun, BoardParams}};\n\
-         use {{ActuatorParams::*, FrictionParams::*, LawParams::*, VelocityParams::*}};\n\n\
-         /// Law and kind of path.\npub type OfRun = Alone<clutch_core::law::{law_name}<f32>, {path_type}>;\n\n\
-         /// The controller at power-up of a board.\n///\n/// # Errors\n/// The board is another than the \
-         scenario's; after a change by hand a number out of range, too.\n\
-         pub fn controller(board: &BoardParams) -> Result<OfRun, AloneMisfit> {{\n    \
-         let law = {of_law};\n    let servo = {servo};\n    \
-         let supervisor = {{\n        use SafeState::*;\n        {}\n    }};\n    \
-         let bounds = {{\n        use ActuatorKind::*;\n        {}\n    }};\n    \
-         let path = {{\n        use Interpolation::*;\n        {}\n    }};\n    \
-         let run = AloneRun {{\n        servo,\n        law,\n        supervisor,\n        bounds,\n        path,\n        \
-         start: FixedCounts({start}),\n        ticks: {ticks},\n        watchdog: Micros({watchdog}),\n    }};\n    \
-         Alone::new(&run, board)\n}}\n",
-        indented(&supervisor, 1),
-        indented(&bounds, 1),
-        indented(&of_path, 1),
-    ))
+    let of_run = [
+        ("law type", law_type.to_owned()),
+        ("path type", path_type),
+        ("law", indented(of_law, 1)),
+        ("servo", indented(&servo, 1)),
+        ("supervisor", indented(&supervisor, 2)),
+        ("bounds", indented(&bounds, 2)),
+        ("path", indented(of_path, 2)),
+        ("start", start.to_string()),
+        // The last period is the one in which the run ends.
+        ("ticks", (run.ticks + 1).to_string()),
+        ("watchdog", run.controller.watchdog.0.to_string()),
+        ("build", BUILD.to_owned()),
+        // Last: it may have any text.
+        ("name", scenario.name().to_owned()),
+    ];
+    let fill = |text: String, (place, what): &(&str, String)| text.replace(&format!("@{place}@"), what);
+    Ok(of_run.iter().fold(MODULE.to_owned(), fill))
+}
+
+/// The name of a variant, and what is in it.
+fn inside(variant: &str) -> (&str, &str) {
+    let (name, of_it) = variant.split_once('(').unwrap_or((variant, ""));
+    (name, of_it.strip_suffix(')').unwrap_or(of_it))
 }
 
 /// A value as Rust writes it: `Debug`, with one value in parentheses on the line of its name.

@@ -1,21 +1,22 @@
 //! SMC at 2 °/s on a NUCLEO-G474RE: in SI units and radians.
-//! Written by `clutch scenario rust`, 0.1.0+1608bc7d6656.
+//! Written by `clutch scenario rust`, 0.1.0+11f4a57d37e1.
 #![allow(unused_imports, reason = "each run has other choices")]
 
+use clutch_core::edge_timed::*;
 use clutch_core::law::*;
 use clutch_core::reference::*;
 use clutch_core::*;
 use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams};
-use {ActuatorParams::*, FrictionParams::*, LawParams::*, VelocityParams::*};
 
 /// Law and kind of path.
-pub type OfRun = Alone<clutch_core::law::Smc<f32>, Ramp<f32>>;
+pub type OfRun = Alone<Smc<f32>, Ramp<f32>>;
 
 /// The controller at power-up of a board.
 ///
 /// # Errors
 /// The board is another than the scenario's; after a change by hand a number out of range, too.
 pub fn controller(board: &BoardParams) -> Result<OfRun, AloneMisfit> {
+    use {ActuatorParams::*, FrictionParams::*, LawParams::*, VelocityParams::*};
     let law = SmcParams {
         kp: 3.0,
         kd: 400.0,
