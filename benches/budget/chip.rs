@@ -2,7 +2,7 @@
 
 use crate::emulator::Counts;
 use anyhow::{Context, Result};
-use clutch_loop::chip_board::{ChipOptions, ChipRole, ChipSession, Counted};
+use clutch_loop::chip_board::{AloneSession, ChipOptions, ChipRole, ChipSession, Counted};
 use clutch_loop::lockstep_session::LockstepOptions;
 use clutch_sim::Scenario;
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ const fn ends(law: &'static str, set: Pairs, rows: Pairs) -> Run {
     Run { ends: true, ..goes_on(law, set, rows) }
 }
 
-const RUNS: [Run; 14] = [
+const RUNS: [Run; 15] = [
     goes_on("pd", &[], LAWS),
     goes_on("ctc", &[], LAWS),
     goes_on("smc", &[], LAWS),
@@ -67,6 +67,11 @@ const RUNS: [Run; 14] = [
     Run {
         image: "nucleo-daq-read-back",
         ..ends("smc", &[], &[("daq_code_read_back", CODE), ("daq_any_read_back", PERIOD)])
+    },
+    // It has its run compiled in, of which this is the begin.
+    Run {
+        image: "nucleo-alone",
+        ..goes_on("smc", &[], &[("alone_code", CODE), ("alone_goes_on", PERIOD), ("alone_servo", SERVO)])
     },
     Run { image: "nucleo-daq", ..ends("smc", &[], &[("daq_code", CODE), ("daq_any", PERIOD)]) },
 ];
@@ -112,11 +117,19 @@ impl Run {
             until: (!self.ends).then_some(DURATION_S - 0.05),
             ..ChipOptions::default()
         };
-        let options = LockstepOptions { uncertified: true, seed: 1, ..LockstepOptions::default() };
         let image = images.join(self.image);
-        let report = ChipSession::new(scenario, options, chip, ChipRole::of(&image))?.run(&image)?;
+        let counted = if ChipRole::of(&image) == ChipRole::Alone {
+            AloneSession::new(scenario, true, chip.faults, chip.count)?.run(&image)?.counted
+        } else {
+            self.with_host(scenario, chip, &image)?
+        };
         std::fs::remove_file(&file)?;
-        report.counted.context("nothing was counted")
+        counted.context("nothing was counted")
+    }
+
+    fn with_host(&self, scenario: Scenario, chip: ChipOptions, image: &Path) -> Result<Option<Counted>> {
+        let options = LockstepOptions { uncertified: true, seed: 1, ..LockstepOptions::default() };
+        Ok(ChipSession::new(scenario, options, chip, ChipRole::of(image))?.run(image)?.counted)
     }
 }
 

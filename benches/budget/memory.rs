@@ -10,9 +10,6 @@ const RAM: u32 = 0x2000_0000;
 /// word to align them.
 const EXCEPTION: u64 = 104 + 4;
 
-/// A period, in the images that are flashed. The code that polls the task calls through registers, and has no bound.
-const PERIOD: &str = "clutch_node::board_program::tick";
-
 /// Prints flash, static RAM and a period's stack of an image that is flashed; gives the values over budget.
 ///
 /// # Errors
@@ -25,7 +22,8 @@ pub(crate) fn flashed(image: &Image, budget: &Memory) -> Result<Vec<String>, Fau
     }
     let name = &budget.image;
     println!("\nImage `{name}`, bytes: flash {flash}, static RAM {ram}");
-    let stack = Stacks::new(image).of(PERIOD)?;
+    // The code that polls the task calls through registers, and has no bound.
+    let stack = Stacks::new(image).of(&budget.period)?;
     println!("\n| stack of a period | {} |\n|---|---|", stack.bytes);
     stack.path.iter().for_each(|(function, bytes)| println!("| `{function}` | {bytes} |"));
     let values = [

@@ -116,6 +116,13 @@ pub(crate) struct Memory {
     pub(crate) flash: u64,
     pub(crate) ram: u64,
     pub(crate) stack: u64,
+    /// The function of a period, in an image that is flashed.
+    #[serde(default = "with_host")]
+    pub(crate) period: String,
+}
+
+fn with_host() -> String {
+    "clutch_node::board_program::tick".to_owned()
 }
 
 impl Plan {

@@ -171,7 +171,9 @@ fn moved(i: &Instruction, depth: i64) -> Option<i64> {
         "add" | "addw" if first == "sp" => depth - number(i.operands.last())?,
         "str" | "strd" if writes_back => depth - number(i.operands.last())?,
         "ldr" | "ldrd" if writes_back => depth - number(i.operands.last())?,
-        _ if first == "sp" && !matches!(i.name.as_str(), "cmp" | "stm" | "vstmia") => return None,
+        // Several registers from or to where it points, which it goes on to do.
+        "ldm" | "stm" | "vldmia" | "vstmia" if first == "sp" && !writes_back => depth,
+        _ if first == "sp" && i.name != "cmp" => return None,
         _ => depth,
     })
 }

@@ -178,6 +178,13 @@ fn the_stack_is_as_deep_as_what_lies_on_it_at_once() {
 }
 
 #[test]
+fn several_registers_from_the_stack_leave_it_as_deep_as_it_was() {
+    // sub sp, #16; ldm.w sp, {r0, r1, r2, r3}; add sp, #16; bx lr
+    let image = image(&[("f", &[0xb084, 0xe89d, 0x000f, 0xb004, BX_LR])]);
+    assert_eq!(Stacks::new(&image).of("f").map(|s| s.bytes), Ok(16));
+}
+
+#[test]
 fn a_way_that_was_gone_costs_what_it_costs_by_hand() {
     // As in the first of these: the branch is taken in the one call and not in the other.
     let image = image(&[("f", &[0x2800, 0xd000, 0x2001, BX_LR])]);

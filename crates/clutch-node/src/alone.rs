@@ -222,21 +222,42 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         let anew = pressed && !self.button.pressed;
         let press = self.button.presses(pressed, self.period_us());
         match self.state.state() {
-            State::Armed | State::Running if anew => {
-                self.supervisor.stop(&mut self.state, Cause::Operator);
-                self.code = self.state.code();
-                // It is used up: it acknowledges nothing.
-                self.button = Button { pressed: true, otherwise_us: 0 };
-            }
-            State::Ready if press => {
-                self.supervisor.arm(&mut self.state, self.code);
-                self.answered_us = now_us;
-            }
-            State::Holding | State::Released | State::Faulted if press => {
-                self.supervisor.acknowledge(&mut self.state);
-            }
+            State::Armed | State::Running if anew => self.end(Cause::Operator),
+            State::Ready | State::Holding | State::Released | State::Faulted if press => self.agree(now_us),
             _ => {}
         }
+    }
+
+    /// Consent to a run, or to leave the end of one.
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
+    fn agree(&mut self, now_us: u32) {
+        if self.state.state() == State::Ready {
+            self.supervisor.arm(&mut self.state, self.code);
+            self.answered_us = now_us;
+        } else {
+            self.supervisor.acknowledge(&mut self.state);
+        }
+    }
+
+    /// The end of control, as wanted.
+    // As above.
+    #[cold]
+    #[inline(never)]
+    fn end(&mut self, cause: Cause) {
+        self.supervisor.stop(&mut self.state, cause);
+        self.code = self.state.code();
+        // A press that ends a run is used up: it acknowledges nothing.
+        self.button = Button { pressed: true, otherwise_us: 0 };
+    }
+
+    /// The law has given no code for too long.
+    // As above.
+    #[cold]
+    #[inline(never)]
+    fn silent(&mut self) {
+        self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
     }
 
     /// The sample: judged, and answered.
@@ -244,7 +265,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         let driving = matches!(self.state.state(), State::Armed | State::Running);
         let silent_us = now_us.wrapping_sub(self.answered_us);
         if driving && silent_us >= self.watchdog.0 {
-            self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
+            self.silent();
         }
         if self.state.state() == State::Armed {
             self.origin = FixedCounts::from_counts(i64::from(sample.counts.0)).plus(self.start);
@@ -262,7 +283,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             self.answered_us = now_us;
         }
         if cycle.state == State::Running && self.state.tick().saturating_add(1) >= self.ticks {
-            self.supervisor.stop(&mut self.state, Cause::Done);
+            self.end(Cause::Done);
         }
         // Before consent the code is the one that was there.
         if self.state.state() != State::Ready {
@@ -280,7 +301,8 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             State::Faulted => self.state.cause() as u32,
         };
         // Dark before each, and for three times as long behind the last.
-        let at = (self.lit_us / FLASH_US) % (2 * flashes + 2);
-        at < 2 * flashes && at & 1 == 1
+        let dark = flashes.saturating_mul(2);
+        let at = (self.lit_us / FLASH_US).checked_rem(dark.saturating_add(2)).unwrap_or(0);
+        at < dark && at & 1 == 1
     }
 }

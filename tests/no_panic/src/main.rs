@@ -27,11 +27,15 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Beside, Command, ControlLaw, Ctc, Dob, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid,
-    Shell, ShellParams, Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
+    Beside, Command, ControlLaw, Ctc, Dob, Glide, Hold, Law, LawParams, LawTerms, Listed, Output,
+    OutputParams, Pd, Pid, Shell, ShellParams, Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
+    Voltage,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
-use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
+use clutch_core::reference::{
+    Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, OneKind, Ramp, Reference, ReferenceParams, Sine,
+    Table, Trapezoid,
+};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
     Actuator, ActuatorKind, ActuatorParams, Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams,
@@ -43,8 +47,9 @@ use clutch_core::{
 };
 use clutch_node::controller_lockstep::Exchange;
 use clutch_node::{
-    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter, present_code, receive, tick,
+    Alone, AloneRun, BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode,
+    ControllerParams, DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter,
+    present_code, receive, tick,
 };
 use clutch_settings::{Path, RunParams, Settings};
 use clutch_wire::{BoardState, Configure, Decoder, Hello, ResetCause, StopReason, encode};
@@ -621,6 +626,7 @@ impl Hardware for Unknown {
 }
 
 fn runner(params: &BoardParams) {
+    alone(params);
     if let Some(role) = made(DaqBoard::new(params)) {
         periods(role);
     }
@@ -639,6 +645,57 @@ fn periods(mut role: impl Role) {
         role = opaque(role);
         receive(&mut role, &mut hardware, bytes(&any_bytes()));
         role = opaque(role);
+        if flag() {
+            return;
+        }
+    }
+}
+
+/// A controller without a host, with each law on a ramp and each kind of path under one law.
+fn alone(params: &BoardParams) {
+    alone_with::<Pd<f32>, Ramp<f32>>(params, any());
+    alone_with::<Ctc<f32>, Ramp<f32>>(params, any());
+    alone_with::<Smc<f32>, Ramp<f32>>(params, any());
+    alone_with::<SmcSign<f32>, Ramp<f32>>(params, any());
+    alone_with::<Pid<f32>, Ramp<f32>>(params, any());
+    alone_with::<SuperTwisting<f32>, Ramp<f32>>(params, any());
+    alone_with::<SmcIntegral<f32>, Ramp<f32>>(params, any());
+    alone_with::<Dob<f32>, Ramp<f32>>(params, any());
+    alone_with::<Glide<f32>, Ramp<f32>>(params, any());
+    alone_with::<Voltage<f32>, Ramp<f32>>(params, any());
+    alone_with::<Hold<f32>, Ramp<f32>>(params, any());
+    alone_with::<Pd<f32>, Trapezoid<f32>>(params, any());
+    alone_with::<Pd<f32>, JerkLimited<f32>>(params, any());
+    alone_with::<Pd<f32>, MinimumJerk<f32>>(params, any());
+    alone_with::<Pd<f32>, Sine<f32>>(params, any());
+    alone_with::<Pd<f32>, Chirp<f32>>(params, any());
+    let knots: &'static [Knot] = opaque(&[Knot { time_us: 3, position: FixedCounts(7) }]);
+    let interpolation = if flag() { Interpolation::Linear } else { Interpolation::Cubic };
+    alone_with::<Pd<f32>, _>(params, Table { knots, interpolation });
+}
+
+fn alone_with<L, P>(params: &BoardParams, path: P)
+where
+    L: Listed<f32>,
+    L::Params: Params<f32>,
+    P: OneKind<f32>,
+{
+    let run = AloneRun::<L, P> {
+        servo: servo_params(),
+        law: any(),
+        supervisor: supervisor_params(),
+        bounds: any(),
+        path,
+        start: fixed(),
+        ticks: word(),
+        watchdog: micros(),
+    };
+    let Some(mut alone) = made(Alone::new(&run, params)) else { return };
+    let mut hardware = Unknown(WideCounter::new(word() as u16));
+    loop {
+        alone.tick(&mut hardware, flag());
+        sink((alone.lamp(), alone.origin(), alone.period_us(), alone.state().state()));
+        alone = opaque(alone);
         if flag() {
             return;
         }

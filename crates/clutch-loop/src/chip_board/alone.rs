@@ -250,10 +250,13 @@ impl Course<'_> {
         self.figures.period(time, motion == Motion::Stuck, &events);
     }
 
-    /// The flashes of the lamp until it pauses.
+    /// The flashes of the lamp until it pauses; none while it is lit because control has not ended.
     fn flashes(&mut self) -> Result<u32, VirtualError> {
         let (end_ns, mut flashes, mut changed_ns, mut lit) =
             (self.now_ns + FLASHES_NS, 0, self.now_ns, self.board.lamp());
+        if lit {
+            return Ok(0);
+        }
         // A program that begins anew flashes nothing.
         while self.board.resets() == 0
             && self.now_ns < end_ns
