@@ -11,7 +11,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 /// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file, and a scenario's
-/// settings for a program in C.
+/// settings for a program in C or Rust.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml\n  clutch scenario schema > scenario.schema.json"
