@@ -98,7 +98,6 @@ pub struct Alone<L: Listed<f32>, P: OneKind<f32>> {
     state: SupervisorState<f32, <L as ControlLaw<f32>>::State>,
     /// The position at which the path begins.
     origin: FixedCounts,
-    code: DacCode,
     sequence: u16,
     /// Time of the last answer, or of consent, µs.
     answered_us: u32,
@@ -149,7 +148,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         // A run goes on from the count at which it finds the shaft.
         let whole = path.target(0).position.plus(run.start).0 >> FixedCounts::FRACTION_BITS;
         let start = FixedCounts(run.start.0.wrapping_sub(FixedCounts::from_counts(whole).0));
-        let mut state = SupervisorState::default();
+        let mut state = SupervisorState::at_code(boot_code);
         supervisor.connect(&mut state);
         Ok(Alone {
             servo,
@@ -160,7 +159,6 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             watchdog: run.watchdog,
             state,
             origin: FixedCounts::default(),
-            code: boot_code,
             sequence: 0,
             answered_us: 0,
             lateness: Micros(0),
@@ -207,7 +205,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         let before = self.state.state();
         self.listen(now_us as u32, pressed);
         self.sample(now_us as u32, sample);
-        hardware.put_out(self.code);
+        hardware.put_out(self.state.code());
         self.lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
         hardware.feed_watchdog();
         let planned = BeginningAt { planned: &self.path, origin: self.origin };
@@ -234,7 +232,8 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
     #[inline(never)]
     fn agree(&mut self, now_us: u32) {
         if self.state.state() == State::Ready {
-            self.supervisor.arm(&mut self.state, self.code);
+            let present = self.state.code();
+            self.supervisor.arm(&mut self.state, present);
             self.answered_us = now_us;
         } else {
             self.supervisor.acknowledge(&mut self.state);
@@ -247,7 +246,6 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
     #[inline(never)]
     fn end(&mut self, cause: Cause) {
         self.supervisor.stop(&mut self.state, cause);
-        self.code = self.state.code();
         // A press that ends a run is used up: it acknowledges nothing.
         self.button = Button { pressed: true, otherwise_us: 0 };
     }
@@ -284,10 +282,6 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         }
         if cycle.state == State::Running && self.state.tick().saturating_add(1) >= self.ticks {
             self.end(Cause::Done);
-        }
-        // Before consent the code is the one that was there.
-        if self.state.state() != State::Ready {
-            self.code = self.state.code();
         }
     }
 

@@ -5,8 +5,8 @@ use clutch_core::law::{Pd, PdParams};
 use clutch_core::reference::{Interpolation, Knot, OneKind, Ramp, Reference, ReferenceParams, Table};
 use clutch_core::supervisor::{BoardMode, Cause, Sample, State};
 use clutch_core::{
-    BeginningAt, Counts, DacCode, Encoder, FixedCounts, Micros, ParamError, Planned, Servo, SupervisorState,
-    Target,
+    BeginningAt, Counts, DacCode, Encoder, FixedCounts, Micros, ParamError, Planned, SafeState, Servo,
+    SupervisorState, Target,
 };
 use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, Hardware};
 
@@ -238,6 +238,22 @@ fn a_fault_latches_and_its_lamp_counts_the_cause() {
     assert_eq!(bench.state().0, State::Faulted);
     bench.press(25);
     assert_eq!((bench.state(), bench.alone.lamp()), ((State::Ready, Cause::None), false));
+}
+
+/// Before consent a fault begins with the output that is there, not with code 0: a ramp would let the brake go first.
+#[test]
+fn a_fault_before_consent_begins_with_the_boot_code() {
+    let mut plan = Plan::new();
+    // 2 V/s up from the boot code's 4 V, 2 mV a period.
+    plan.limits.on_fault = SafeState::ramp(2.0, 8.0);
+    let mut bench = Bench::new(&plan);
+    assert_eq!(bench.pass(50), BOOT_CODE);
+    bench.desk.encoder_fault = true;
+    let codes: Vec<u16> = (0..100).map(|_| bench.pass(1)).collect();
+    assert_eq!(bench.state(), (State::Faulted, Cause::Board));
+    assert!(codes.is_sorted() && codes[0] >= BOOT_CODE && codes[0] <= BOOT_CODE + 1, "{codes:?}");
+    // 0.2 V after 0.1 s, of 4.88 mV each.
+    assert!((i32::from(codes[99]) - i32::from(BOOT_CODE) - 41).abs() <= 1, "{codes:?}");
 }
 
 #[test]
