@@ -118,7 +118,7 @@ impl Run {
             ..ChipOptions::default()
         };
         let image = images.join(self.image);
-        let counted = if ChipRole::of(&image) == ChipRole::Alone {
+        let counted = if AloneSession::is_for(&image) {
             AloneSession::new(scenario, true, chip.faults, chip.count)?.run(&image)?.counted
         } else {
             self.with_host(scenario, chip, &image)?

@@ -182,7 +182,7 @@ fn a_controller_without_a_host_is_the_simulation_bit_for_bit() {
     let (scenario, ran) = without_a_host(&image, Vec::new());
     let simulated = simulate(&scenario);
     assert_eq!(ran.codes, simulated.trace.code);
-    assert_eq!((ran.codes.len(), ran.differs(), ran.done()), (10_000, None, true));
+    assert_eq!((ran.codes.len(), ran.differs(), ran.done(), ran.goes_on), (10_000, None, true, false));
     assert_eq!((ran.flashes, ran.fault(), ran.resets, ran.dead), (1, None, 0, false));
     let figures = Metrics { stick_time_fraction: simulated.metrics.stick_time_fraction, ..ran.metrics };
     assert_eq!(figures, simulated.metrics);
@@ -192,7 +192,7 @@ fn a_controller_without_a_host_is_the_simulation_bit_for_bit() {
 }
 
 #[test]
-fn a_controller_without_a_host_ends_in_its_safe_output_whatever_breaks() {
+fn a_chip_without_a_host_that_breaks_ends_control_at_once_and_its_lamp_says_why() {
     let Some(image) = image("nucleo-alone") else { return };
     let _beside = beside();
     let broken = |kind| {
@@ -206,7 +206,8 @@ fn a_controller_without_a_host_ends_in_its_safe_output_whatever_breaks() {
     use ChipFaultKind::{ConverterStuck, Hang, Nmi, Panic, StackOverflow, SupplyLow, Undefined, Unexpected};
     for kind in [Undefined, Nmi, Unexpected, StackOverflow, Panic] {
         let ran = broken(kind);
-        assert_eq!((ran.resets, ran.flashes, ran.last_code), (1, 0, BOOT_CODE), "{kind:?}");
+        // The program begins anew as Faulted.
+        assert_eq!((ran.resets, ran.flashes, ran.last_code), (1, 12, BOOT_CODE), "{kind:?}");
     }
     for kind in [SupplyLow, ConverterStuck] {
         let ran = broken(kind);
@@ -215,7 +216,31 @@ fn a_controller_without_a_host_ends_in_its_safe_output_whatever_breaks() {
     }
     // The lamp stays lit until the watchdog resets the chip.
     let (_, ran) = without_a_host(&image, vec![ChipFault { kind: Hang, at: Some(0.3) }]);
-    assert_eq!((ran.resets, ran.done(), ran.flashes, ran.last_code), (1, false, 0, BOOT_CODE));
+    assert_eq!((ran.resets, ran.done(), ran.flashes, ran.last_code), (1, false, 12, BOOT_CODE));
+}
+
+/// A scenario with other numbers than the image's, and one that is shorter.
+#[test]
+fn a_chip_without_a_host_that_has_another_run_is_told() {
+    let Some(image) = image("nucleo-alone") else { return };
+    let _beside = beside();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/nucleo_smc_2.toml");
+    let run = |key: &str, value: &str| {
+        let scenario = Scenario::load(&file, &[(key.to_owned(), value.to_owned())]).expect("the example");
+        AloneSession::new(scenario, true, Vec::new(), None)
+            .expect("a session")
+            .run(&image)
+            .expect("the chip runs")
+    };
+    let other = run("law.smc.kp_v", "2.9");
+    assert!(other.done() && other.differs().is_some_and(|tick| tick < 100), "{:?}", other.differs());
+    let shorter = run("run.duration_s", "3");
+    assert_eq!(
+        (shorter.goes_on, shorter.done(), shorter.differs(), shorter.ticks),
+        (true, false, None, 3000)
+    );
+    let longer = run("run.duration_s", "11");
+    assert_eq!((longer.goes_on, longer.done(), longer.differs(), longer.flashes), (false, false, None, 1));
 }
 
 /// A run in which something breaks on the chip; `at` s after arming, or at power-up.

@@ -157,6 +157,11 @@ fn flash(board: Flashed, role: Role) -> Result<()> {
         }
         Role::Alone => "alone",
     };
+    if role == "alone" {
+        // Whose run it is, and what is known of its gains.
+        let run = std::fs::read_to_string(root().join("firmware/nucleo-g474re/src/alone_run.rs"))?;
+        run.lines().map_while(|line| line.strip_prefix("//!")).for_each(|line| println!("{}", line.trim()));
+    }
     let image = folder(package.1).join(format!("{name}-{role}"));
     program("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&image).run()?;
     program("probe-rs").args(["reset", "--chip", chip]).run()

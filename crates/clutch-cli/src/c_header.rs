@@ -1,7 +1,7 @@
 //! `clutch scenario header`: a scenario's settings for libclutch.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, paragraph, print, warn};
+use crate::output::{BUILD, Exit, paragraph, print, remark, warn};
 use anyhow::ensure;
 use clap::Args;
 use clutch_core::Micros;
@@ -11,19 +11,41 @@ use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_settings::{Declared, SETTINGS_HASH, Setting, Settings};
 use clutch_sim::Scenario;
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// Prints the settings of a scenario as a C header for libclutch.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch scenario header mine.toml > run.h")]
 pub(crate) struct HeaderVerb {
     #[command(flatten)]
-    scenario: ScenarioArgs,
+    run: CompiledArgs,
     /// Begin of the names in the header.
     #[arg(long, default_value = "run")]
     name: String,
-    /// Prints them although the gains are not certified.
+}
+
+/// A scenario whose run a program has compiled in.
+#[derive(Args)]
+pub(crate) struct CompiledArgs {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Prints a run although its gains are not certified.
     #[arg(long)]
     uncertified: bool,
+    /// Certificate of the sampled loop, as `clutch certify --sampled --save` writes it: it is checked, and that it is this
+    /// scenario's.
+    #[arg(long, value_name = "FILE.json")]
+    certificate: Option<PathBuf>,
+}
+
+/// A run for a program that has it compiled in.
+pub(crate) struct Compiled {
+    /// In single precision.
+    pub(crate) scenario: Scenario,
+    pub(crate) run: BuiltRun<f32>,
+    settings: Settings,
+    /// What is known of the gains, a line each.
+    pub(crate) verdicts: Vec<String>,
 }
 
 impl HeaderVerb {
@@ -34,43 +56,46 @@ impl HeaderVerb {
             "--name {}: expected a name of C, of letters, digits and underscores",
             self.name
         );
-        let Some((single, run, settings)) = compiled_in(&self.scenario, self.uncertified)? else {
-            return Ok(Exit::NotCertified);
-        };
-        print(&header(&self.name, &single, &settings, &run))?;
+        let Some(compiled) = self.run.load()? else { return Ok(Exit::NotCertified) };
+        print(&header(&self.name, &compiled))?;
         Ok(Exit::Done)
     }
 }
 
-/// A scenario's run for a program that has it compiled in: in single precision, and such that a board takes it. None, and
-/// the reason is printed, if its gains are not certified.
-pub(crate) fn compiled_in(
-    scenario: &ScenarioArgs,
-    uncertified: bool,
-) -> anyhow::Result<Option<(Scenario, BuiltRun<f32>, Settings)>> {
-    let file = scenario.scenario.display();
-    let scenario = scenario.load()?;
-    match check(&scenario, None, uncertified, None) {
-        Ok(_) => {}
-        Err(ClearanceError::NotCertified { lack, .. }) => {
-            let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
-            let advice = format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
-            warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
-            return Ok(None);
-        }
-        Err(refusal) => return Err(refusal.into()),
+impl CompiledArgs {
+    /// The run, such that a board takes it; none, and the reason is printed, if its gains are not certified. Limits that a
+    /// sound shaft will meet are remarked, as before a run on a board.
+    pub(crate) fn load(&self) -> anyhow::Result<Option<Compiled>> {
+        let file = self.scenario.scenario.display();
+        let scenario = self.scenario.load()?;
+        let cleared = match check(&scenario, self.certificate.as_deref(), self.uncertified, None) {
+            Ok(cleared) => cleared,
+            Err(ClearanceError::NotCertified { lack, .. }) => {
+                let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
+                let advice =
+                    format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
+                warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
+                return Ok(None);
+            }
+            Err(refusal) => return Err(refusal.into()),
+        };
+        cleared.limits_met(&scenario).iter().for_each(|note| remark(&paragraph(note)));
+        let verdicts =
+            cleared.verdicts().iter().map(|(name, verdict)| format!("{name}: {verdict}")).collect();
+        let scenario = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
+        let run = BuiltRun::new(&scenario, 0)?;
+        // Nobody but the program itself looks on.
+        let settings = from_scenario::settings(&scenario, &run, Micros(0), run.ticks)?;
+        Ok(Some(Compiled { scenario, run, settings, verdicts }))
     }
-    let single = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
-    let run = BuiltRun::new(&single, 0)?;
-    // Nobody but the program itself looks on.
-    let settings = from_scenario::settings(&single, &run, Micros(0), run.ticks)?;
-    Ok(Some((single, run, settings)))
 }
 
-fn header(name: &str, scenario: &Scenario, settings: &Settings, run: &BuiltRun<f32>) -> String {
+fn header(name: &str, compiled: &Compiled) -> String {
+    let Compiled { scenario, run, settings, verdicts } = compiled;
+    let verdicts: String = verdicts.iter().map(|line| format!("\n   {}", comment(line))).collect();
     let guard = name.to_ascii_uppercase();
     let mut out = format!(
-        "/* {}: written by `clutch scenario header`, {BUILD}. */\n\
+        "/* {}: written by `clutch scenario header`, {BUILD}.{verdicts} */\n\
          #ifndef {guard}_SETTINGS_H\n#define {guard}_SETTINGS_H\n\n#include \"clutch.h\"\n\n\
          #if CLUTCH_SETTINGS_HASH != {SETTINGS_HASH:#018x}\n\
          #error \"these settings are of another version of libclutch: write them anew\"\n#endif\n\n\

@@ -156,7 +156,7 @@ impl Hil {
                  --chip-fault those of the chip"
             );
         }
-        if role == ChipRole::Alone {
+        if AloneSession::is_for(&self.image) {
             return self.alone(kind, chip);
         }
         let session = ChipSession::new(self.load()?, self.options(), chip, role);
@@ -210,16 +210,18 @@ impl Hil {
                 "took_s": took,
                 "metrics": ran.metrics,
                 "differs_at_tick": ran.differs(),
+                "goes_on": ran.goes_on,
                 "flashes": ran.flashes,
                 "cause": ran.fault().map(|cause| format!("{cause:?}")),
                 "chip": chip_json(&ran),
             }))
         };
         report(self.json, all, || alone_text(scenario, &ran, kind, took))?;
+        let fault = ran.resets > 0 || !(ran.goes_on || ran.flashes == 1);
         Ok(match (ran.done(), ran.differs()) {
-            (false, _) => Exit::Fault,
-            (true, Some(_)) => Exit::Failed,
             (true, None) => Exit::Done,
+            _ if fault => Exit::Fault,
+            _ => Exit::Failed,
         })
     }
 
@@ -304,27 +306,36 @@ fn alone_text(scenario: &Scenario, ran: &AloneReport, kind: ChipKind, took: f64)
     let mut text = quantities(&title, &sim::figures(&ran.metrics));
     let code = |codes: &[u16], tick: usize| codes.get(tick).map_or("none".to_owned(), u16::to_string);
     text += &paragraph(&match ran.differs() {
-        None => "each code is that of the same controller in this process".to_owned(),
-        Some(tick) if ran.done() => format!(
-            "tick {tick}: its code is {}, that of the same controller in this process {}. The image has its run compiled \
-             in: is it this scenario's (clutch scenario rust)? A law with memory begins with the voltage that the brake \
-             has: BOOT_CODE there, the safe state's here.",
+        None => "each code is that of the scenario's controller on this machine".to_owned(),
+        Some(tick) if ran.resets == 0 && ran.fault().is_none() => format!(
+            "tick {tick}: its code is {}, that of the scenario's controller on this machine {}. The image has its run compiled \
+             in: is it this scenario's (clutch scenario rust)?",
             code(&ran.codes, tick),
             code(&ran.expected, tick)
         ),
-        Some(tick) => format!("the first {tick} codes are those of the same controller in this process"),
+        Some(tick) => {
+            format!("the first {tick} codes are those of the scenario's controller on this machine")
+        }
     });
-    let end = match (ran.flashes, ran.fault()) {
-        (0, _) => "the lamp does not flash".to_owned(),
+    let ticks = ran.codes.len();
+    text += &paragraph(&match (ran.flashes, ran.fault()) {
+        (_, _) if ran.goes_on => {
+            format!("control goes on after the scenario's {} ticks: the image has a longer run", ran.ticks)
+        }
+        (0, _) => format!("control ended after {ticks} ticks; the lamp does not flash"),
         (1, _) if ran.done() => {
             "the lamp flashes once: the path is done, and the safe output holds".to_owned()
         }
-        (n, Some(cause)) => format!("FAULT: the lamp flashes {n} times, {cause:?} (docs/firmware.md)"),
-        (n, None) => format!("the lamp flashes {n} times"),
-    };
-    let ended =
-        if ran.done() { String::new() } else { format!("; control ended after {} ticks", ran.codes.len()) };
-    text += &paragraph(&(end + &ended));
+        (1, _) => {
+            format!("the lamp flashes once: the path is done after {ticks} ticks, and not {}", ran.ticks)
+        }
+        (n, Some(cause)) => {
+            format!(
+                "FAULT: control ended after {ticks} ticks; the lamp flashes {n} times, {cause:?} (docs/firmware.md)"
+            )
+        }
+        (n, None) => format!("FAULT: control ended after {ticks} ticks; the lamp flashes {n} times"),
+    });
     text + &chip_text(ran.resets, ran.dead, ran.floating)
 }
 

@@ -1,12 +1,9 @@
 //! `clutch scenario rust`: a scenario's run for a program in Rust.
 
-use crate::args::ScenarioArgs;
-use crate::c_header::compiled_in;
+use crate::c_header::{Compiled, CompiledArgs};
 use crate::output::{BUILD, Exit, print};
 use clap::Args;
 use clutch_core::FixedCounts;
-use clutch_loop::from_scenario::BuiltRun;
-use clutch_sim::Scenario;
 use std::fmt::Debug;
 
 /// Prints a scenario's run as a module of Rust, for a controller without a host.
@@ -19,25 +16,21 @@ use std::fmt::Debug;
 )]
 pub(crate) struct RustVerb {
     #[command(flatten)]
-    scenario: ScenarioArgs,
-    /// Prints it although the gains are not certified.
-    #[arg(long)]
-    uncertified: bool,
+    run: CompiledArgs,
 }
 
 impl RustVerb {
     pub(crate) fn run(&self) -> anyhow::Result<Exit> {
-        let Some((scenario, run, _)) = compiled_in(&self.scenario, self.uncertified)? else {
-            return Ok(Exit::NotCertified);
-        };
-        print(&module(&scenario, &run)?)?;
+        let Some(compiled) = self.run.load()? else { return Ok(Exit::NotCertified) };
+        print(&module(&compiled)?)?;
         Ok(Exit::Done)
     }
 }
 
 /// The module; each place between two @ is filled in.
 const MODULE: &str = r#"//! @name@: in SI units and radians.
-//! Written by `clutch scenario rust`, @build@.
+//!
+@verdicts@//! Written by `clutch scenario rust`, @build@.
 #![allow(unused_imports, reason = "each run has other choices")]
 
 use clutch_core::edge_timed::*;
@@ -84,7 +77,8 @@ pub fn controller(board: &BoardParams) -> Result<OfRun, AloneMisfit> {
 "#;
 
 /// The run as a module.
-fn module(scenario: &Scenario, run: &BuiltRun<f32>) -> anyhow::Result<String> {
+fn module(compiled: &Compiled) -> anyhow::Result<String> {
+    let Compiled { scenario, run, verdicts, .. } = compiled;
     let spec = scenario.spec();
     let law = literal(&run.params.law);
     let (law_type, of_law) = inside(&law);
@@ -116,6 +110,7 @@ fn module(scenario: &Scenario, run: &BuiltRun<f32>) -> anyhow::Result<String> {
         ("ticks", (run.ticks + 1).to_string()),
         ("watchdog", run.controller.watchdog.0.to_string()),
         ("build", BUILD.to_owned()),
+        ("verdicts", verdicts.iter().map(|line| format!("//! {line}.\n//!\n")).collect()),
         // Last: it may have any text.
         ("name", scenario.name().to_owned()),
     ];

@@ -6,32 +6,45 @@
 //!  button ───┘                                 └─► lamp
 //! ```
 //!
-//! | state | a press of the button | lamp |
+//! | state | button | lamp |
 //! |---|---|---|
-//! | Ready | consent: the run begins with the next sample | off |
-//! | Armed, Running | the end of control, at once | on |
-//! | Holding, Released | acknowledged: Ready | a flash each second |
-//! | Faulted | acknowledged: Ready | as many flashes as the number of the [`Cause`], then a pause |
+//! | Ready | a press is consent: the run begins with the next sample | a flash each 2.2 s |
+//! | Armed, Running | a press ends control, with the first sample that sees it | on |
+//! | Holding, Released | a press of 1 s acknowledges: Ready | a flash each 0.8 s |
+//! | Faulted | the same | as many flashes as the number of the [`Cause`], then a pause |
 //!
-//! A press gives consent once it has lasted 20 ms, and once the button has been let go for as long before: neither a
-//! contact that bounces nor a button that is stuck, or held at power-up, begins a run. The next press ends it with the
-//! first sample that sees it.
+//! A press gives consent once it has lasted 20 ms, in a state that has lasted 1 s, and once the button has been let go for
+//! 20 ms before: neither a contact that bounces nor a button that is stuck, or held at power-up, begins a run, and presses
+//! in a hurry end one and begin none. A press that gave consent and does not end within 2 s ends the run.
+//!
+//! Before the first consent the output is the boot code, whatever is wrong. After a run its safe state goes on by itself,
+//! acknowledged or not, until the next consent. A program that begins anew after a fault begins as Faulted.
 
-use crate::board::BoardParams;
+use crate::board::{BoardMisfit, BoardParams};
 use crate::board_program::Hardware;
 use clutch_core::law::{ControlLaw, Listed};
 use clutch_core::reference::OneKind;
 use clutch_core::supervisor::{BoardMode, Cause, Sample, State};
 use clutch_core::{
-    BeginningAt, Bounds, DacCode, FixedCounts, Micros, ParamError, Planned, Real, Servo, ServoParams,
-    Supervisor, SupervisorParams, SupervisorState,
+    BeginningAt, Bounds, Counts, DacCode, FixedCounts, Micros, ParamError, Planned, Real, SafeRun, Servo,
+    ServoParams, Supervisor, SupervisorParams, SupervisorState,
 };
-use clutch_wire::BoardFault;
+use clutch_wire::{BoardFault, ResetCause, WATCHDOG_PERIODS};
 
-/// Time for which a contact has to stay as it is, µs.
-const STEADY_US: u32 = 20_000;
+/// Time for which the button has to be let go before a press counts: before consent, and before the end of a run, µs.
+const LET_GO_US: u32 = 20_000;
+const LET_GO_TO_STOP_US: u32 = 5_000;
 
-/// Length of a flash, and of the dark before the next, µs.
+/// Length of a press that is consent, µs.
+const PRESS_US: u32 = 20_000;
+
+/// Length of a press that acknowledges, and of a state before consent, µs.
+const LONG_US: u32 = 1_000_000;
+
+/// Length of a press that ends the run to which it was the consent, µs.
+const STUCK_US: u32 = 2_000_000;
+
+/// Length of a flash, and of the dark before it, µs.
 const FLASH_US: u32 = 200_000;
 
 /// A run with its law and its kind of path, whose types keep all others out of the image: as `clutch scenario rust` prints
@@ -59,27 +72,38 @@ pub struct AloneRun<L: Listed<f32>, P> {
 /// A run that a board cannot take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AloneMisfit {
+    /// The board's own parameters.
+    Board(BoardMisfit),
     /// The board's encoder has so many counts per revolution.
     Encoder(u32),
     /// The board's converter has other bits, or another range.
     Converter,
     /// The board does not have this period.
     Period(Micros),
+    /// The watchdog's time is below two periods, above a hundred of them, or above the board's longest.
+    Watchdog(Micros),
     /// A parameter of the run.
     Run(ParamError<f32>),
 }
 
 /// Compares a run with the board's own numbers.
-fn fits(run: &ServoParams<f32>, board: &BoardParams) -> Result<(), AloneMisfit> {
-    // A voltage of whole mV, as both have it.
-    let volts = |mv: i32| f32::from_i32(mv) / 1000.0;
-    let converter = (board.dac_bits, volts(board.dac_lowest_mv), volts(board.dac_highest_mv));
-    if run.encoder.counts_per_rev() != board.counts_per_rev {
+fn fits(servo: &ServoParams<f32>, watchdog: Micros, board: &BoardParams) -> Result<(), AloneMisfit> {
+    board.check().map_err(AloneMisfit::Board)?;
+    // To the nearest mV, as a host compares them.
+    let same = |volts: f32, mv: i32| (volts * 1000.0 - f32::from_i32(mv)).abs() < 0.5;
+    let (dac, period) = (&servo.dac, servo.period);
+    let longest = period.0.saturating_mul(WATCHDOG_PERIODS).min(board.watchdog_max_us);
+    if servo.encoder.counts_per_rev() != board.counts_per_rev {
         Err(AloneMisfit::Encoder(board.counts_per_rev))
-    } else if (run.dac.bits, run.dac.lowest, run.dac.highest) != converter {
+    } else if dac.bits != board.dac_bits
+        || !same(dac.lowest, board.dac_lowest_mv)
+        || !same(dac.highest, board.dac_highest_mv)
+    {
         Err(AloneMisfit::Converter)
-    } else if !(board.period_min_us..=board.period_max_us).contains(&run.period.0) {
-        Err(AloneMisfit::Period(run.period))
+    } else if !(board.period_min_us..=board.period_max_us).contains(&period.0) {
+        Err(AloneMisfit::Period(period))
+    } else if watchdog.0 / 2 < period.0 || watchdog.0 > longest {
+        Err(AloneMisfit::Watchdog(watchdog))
     } else {
         Ok(())
     }
@@ -98,47 +122,57 @@ pub struct Alone<L: Listed<f32>, P: OneKind<f32>> {
     state: SupervisorState<f32, <L as ControlLaw<f32>>::State>,
     /// The position at which the path begins.
     origin: FixedCounts,
+    /// The converter's code.
+    code: DacCode,
+    /// The safe state since the last run; none before the first.
+    safe: Option<SafeRun>,
     sequence: u16,
     /// Time of the last answer, or of consent, µs.
     answered_us: u32,
     lateness: Micros,
     button: Button,
-    /// Time since the state's lamp began, µs.
+    /// Time in this state, µs, as far as an hour.
+    age_us: u32,
+    /// Time since the lamp's pattern began, µs.
     lit_us: u32,
 }
 
-/// A button whose contact bounces.
+/// A button, and how long its contact has been closed or open, µs.
 #[derive(Clone, Copy, Debug)]
 struct Button {
-    pressed: bool,
-    /// Time for which the contact has been otherwise, µs.
-    otherwise_us: u32,
+    down_us: u32,
+    up_us: u32,
+    /// This press has had its effect, until the button is let go.
+    used: bool,
 }
 
 impl Button {
-    /// Its contact in a period; true if this is a press.
-    fn presses(&mut self, pressed: bool, period_us: u32) -> bool {
-        self.otherwise_us =
-            if pressed == self.pressed { 0 } else { self.otherwise_us.saturating_add(period_us) };
-        if self.otherwise_us < STEADY_US {
-            return false;
-        }
-        *self = Button { pressed, otherwise_us: 0 };
-        pressed
+    /// Its contact in a period; let go for `let_go_us` it can be pressed anew.
+    fn sees(&mut self, pressed: bool, period_us: u32, let_go_us: u32) {
+        let [longer, none] =
+            if pressed { [&mut self.down_us, &mut self.up_us] } else { [&mut self.up_us, &mut self.down_us] };
+        *longer = longer.saturating_add(period_us);
+        *none = 0;
+        self.used &= self.up_us < let_go_us;
+    }
+
+    /// True if it is pressed anew, for so long.
+    fn pressed_for(&self, least_us: u32) -> bool {
+        !self.used && self.down_us >= least_us
     }
 }
 
 impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
-    /// A controller at power-up of a board, whose converter has the boot code until the first consent.
+    /// A controller at power-up of a board.
     ///
     /// # Errors
     /// A run of another board; a parameter out of range.
     pub fn new(run: &AloneRun<L, P>, board: &BoardParams) -> Result<Self, AloneMisfit> {
-        fits(&run.servo, board)?;
-        Alone::build(run, DacCode(board.boot_code)).map_err(AloneMisfit::Run)
+        fits(&run.servo, run.watchdog, board)?;
+        Alone::build(run, board).map_err(AloneMisfit::Run)
     }
 
-    fn build(run: &AloneRun<L, P>, boot_code: DacCode) -> Result<Self, ParamError<f32>> {
+    fn build(run: &AloneRun<L, P>, board: &BoardParams) -> Result<Self, ParamError<f32>> {
         let p = &run.servo;
         p.output.check_for(p.model.actuator.kind())?;
         let servo = Servo::with_law(p, L::build(&run.law, &p.beside())?)?;
@@ -148,8 +182,11 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         // A run goes on from the count at which it finds the shaft.
         let whole = path.target(0).position.plus(run.start).0 >> FixedCounts::FRACTION_BITS;
         let start = FixedCounts(run.start.0.wrapping_sub(FixedCounts::from_counts(whole).0));
-        let mut state = SupervisorState::at_code(boot_code);
+        let mut state = SupervisorState::default();
         supervisor.connect(&mut state);
+        if matches!(board.started_by, ResetCause::Watchdog | ResetCause::Fault | ResetCause::Clock) {
+            supervisor.board_fault(&mut state, 0.0);
+        }
         Ok(Alone {
             servo,
             supervisor,
@@ -159,11 +196,14 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             watchdog: run.watchdog,
             state,
             origin: FixedCounts::default(),
+            code: DacCode(board.boot_code),
+            safe: None,
             sequence: 0,
             answered_us: 0,
             lateness: Micros(0),
             // It may be held: it has to be let go first.
-            button: Button { pressed: true, otherwise_us: 0 },
+            button: Button { down_us: 0, up_us: 0, used: true },
+            age_us: 0,
             lit_us: 0,
         })
     }
@@ -191,38 +231,42 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
     #[inline(never)]
     pub fn tick(&mut self, hardware: &mut impl Hardware, pressed: bool) {
         let now_us = hardware.now_us();
-        let sample = Sample {
-            sequence: self.sequence,
-            time: Micros(now_us as u32),
-            counts: hardware.counts(),
-            board: BoardMode::Safe,
-            encoder_fault: hardware.encoder_fault(),
-            converter_fault: hardware.converter_fault(),
-            command_late: false,
-            superseded: false,
-            lateness: core::mem::take(&mut self.lateness),
-        };
-        let before = self.state.state();
+        let counts = hardware.counts();
+        let faults = (hardware.encoder_fault(), hardware.converter_fault());
+        let (before, drove) = (self.state.state(), self.driving());
         self.listen(now_us as u32, pressed);
-        self.sample(now_us as u32, sample);
-        hardware.put_out(self.state.code());
+        let driven = drove || self.driving();
+        self.sample(now_us as u32, counts, faults);
+        self.code = if self.driving() { self.state.code() } else { self.safe_code(driven) };
+        hardware.put_out(self.code);
         self.lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
         hardware.feed_watchdog();
         let planned = BeginningAt { planned: &self.path, origin: self.origin };
         self.supervisor.expect(&mut self.state, &planned);
-        let same = self.state.state() == before;
-        self.lit_us = if same { self.lit_us.wrapping_add(self.period_us()) } else { 0 };
+        self.pass(before);
+    }
+
+    fn driving(&self) -> bool {
+        matches!(self.state.state(), State::Armed | State::Running)
     }
 
     /// The button: consent, its end, or an acknowledgement.
     fn listen(&mut self, now_us: u32, pressed: bool) {
-        // The press that gave consent may go on.
-        let anew = pressed && !self.button.pressed;
-        let press = self.button.presses(pressed, self.period_us());
-        match self.state.state() {
-            State::Armed | State::Running if anew => self.end(Cause::Operator),
-            State::Ready | State::Holding | State::Released | State::Faulted if press => self.agree(now_us),
-            _ => {}
+        let driving = self.driving();
+        let let_go_us = if driving { LET_GO_TO_STOP_US } else { LET_GO_US };
+        self.button.sees(pressed, self.period_us(), let_go_us);
+        let had = match self.state.state() {
+            State::Ready => self.age_us >= LONG_US && self.button.pressed_for(PRESS_US),
+            State::Armed | State::Running => self.button.pressed_for(1) || self.button.down_us >= STUCK_US,
+            _ => self.button.pressed_for(LONG_US),
+        };
+        if had {
+            self.button.used = true;
+            if driving {
+                self.supervisor.stop(&mut self.state, Cause::Operator);
+            } else {
+                self.agree(now_us);
+            }
         }
     }
 
@@ -232,48 +276,39 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
     #[inline(never)]
     fn agree(&mut self, now_us: u32) {
         if self.state.state() == State::Ready {
-            let present = self.state.code();
-            self.supervisor.arm(&mut self.state, present);
+            self.supervisor.arm(&mut self.state, self.code);
             self.answered_us = now_us;
         } else {
             self.supervisor.acknowledge(&mut self.state);
         }
     }
 
-    /// The end of control, as wanted.
-    // As above.
-    #[cold]
-    #[inline(never)]
-    fn end(&mut self, cause: Cause) {
-        self.supervisor.stop(&mut self.state, cause);
-        // A press that ends a run is used up: it acknowledges nothing.
-        self.button = Button { pressed: true, otherwise_us: 0 };
-    }
-
-    /// The law has given no code for too long.
-    // As above.
-    #[cold]
-    #[inline(never)]
-    fn silent(&mut self) {
-        self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
-    }
-
     /// The sample: judged, and answered.
-    fn sample(&mut self, now_us: u32, sample: Sample) {
-        let driving = matches!(self.state.state(), State::Armed | State::Running);
-        let silent_us = now_us.wrapping_sub(self.answered_us);
-        if driving && silent_us >= self.watchdog.0 {
-            self.silent();
-        }
-        if self.state.state() == State::Armed {
-            self.origin = FixedCounts::from_counts(i64::from(sample.counts.0)).plus(self.start);
+    fn sample(&mut self, now_us: u32, counts: Counts, (encoder_fault, converter_fault): (bool, bool)) {
+        if self.driving() && now_us.wrapping_sub(self.answered_us) >= self.watchdog.0 {
+            // The law has given no code for too long.
+            self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
         }
         let board = match self.state.state() {
             State::Ready => BoardMode::Ready,
             State::Armed | State::Running => BoardMode::Driving,
             _ => BoardMode::Safe,
         };
-        let sample = Sample { board, ..sample };
+        if self.state.state() == State::Armed {
+            self.origin = FixedCounts::from_counts(i64::from(counts.0)).plus(self.start);
+        }
+        let sample = Sample {
+            sequence: self.sequence,
+            time: Micros(now_us),
+            counts,
+            board,
+            encoder_fault,
+            converter_fault,
+            // There is no line on which it could be.
+            command_late: false,
+            superseded: false,
+            lateness: core::mem::take(&mut self.lateness),
+        };
         self.sequence = self.sequence.wrapping_add(1);
         let planned = BeginningAt { planned: &self.path, origin: self.origin };
         let cycle = self.supervisor.sample(&self.servo, &mut self.state, &sample, planned);
@@ -281,22 +316,52 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             self.answered_us = now_us;
         }
         if cycle.state == State::Running && self.state.tick().saturating_add(1) >= self.ticks {
-            self.end(Cause::Done);
+            self.supervisor.stop(&mut self.state, Cause::Done);
+        }
+    }
+
+    /// The code without control: the safe state's, which begins when control ends; before there was any, what is there.
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
+    fn safe_code(&mut self, driven: bool) -> DacCode {
+        if driven {
+            self.safe = Some(SafeRun::begin(self.code));
+        }
+        match &mut self.safe {
+            Some(run) => run.next(self.supervisor.safe_codes()),
+            None => self.code,
+        }
+    }
+
+    /// A period of the lamp, and of the state; `before` is the state in which it began.
+    fn pass(&mut self, before: State) {
+        let period_us = self.period_us();
+        if self.state.state() != before {
+            (self.age_us, self.lit_us) = (0, 0);
+            return;
+        }
+        self.age_us = self.age_us.saturating_add(period_us);
+        self.lit_us = self.lit_us.saturating_add(period_us);
+        let (flashes, pause) = self.flashes();
+        if self.lit_us >= FLASH_US.saturating_mul(2 * flashes + pause) {
+            self.lit_us = 0;
+        }
+    }
+
+    /// The lamp's flashes, and the time that it is dark behind them, in lengths of a flash.
+    fn flashes(&self) -> (u32, u32) {
+        match self.state.state() {
+            State::Faulted => (self.state.cause() as u32, 2),
+            State::Holding | State::Released => (1, 2),
+            _ => (1, 9),
         }
     }
 
     /// True while the lamp is to be lit.
     #[must_use]
     pub fn lamp(&self) -> bool {
-        let flashes = match self.state.state() {
-            State::Armed | State::Running => return true,
-            State::Ready | State::Disconnected => return false,
-            State::Holding | State::Released => 1,
-            State::Faulted => self.state.cause() as u32,
-        };
-        // Dark before each, and for three times as long behind the last.
-        let dark = flashes.saturating_mul(2);
-        let at = (self.lit_us / FLASH_US).checked_rem(dark.saturating_add(2)).unwrap_or(0);
-        at < dark && at & 1 == 1
+        let at = self.lit_us / FLASH_US;
+        self.driving() || (at < 2 * self.flashes().0 && at & 1 == 1)
     }
 }

@@ -1,5 +1,14 @@
 //! SMC at 2 °/s on a NUCLEO-G474RE: in SI units and radians.
-//! Written by `clutch scenario rust`, 0.1.0+11f4a57d37e1.
+//!
+//! certified_continuous_time: true.
+//!
+//! as_sampled: the bound of the error is uncertified: no certificate was given.
+//!
+//! linear_stability: linearly stable: spectral radius 0.948, 0.948, 0.948 with the weakest, a middle and the strongest brake, while nothing saturates or sticks.
+//!
+//! sticks: not excluded, neither by a bound nor by stability.
+//!
+//! Written by `clutch scenario rust`, 0.1.0+5d613feef88e.
 #![allow(unused_imports, reason = "each run has other choices")]
 
 use clutch_core::edge_timed::*;

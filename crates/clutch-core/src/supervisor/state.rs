@@ -246,15 +246,6 @@ impl<T: Real, S> SupervisorState<T, S> {
         self.lost.any(now) || self.late.any(now)
     }
 
-    /// Memory before any sample, of a converter that has a code: what a ramp of the safe state begins with.
-    #[must_use]
-    pub fn at_code(code: DacCode) -> Self
-    where
-        S: Default,
-    {
-        SupervisorState { code, ..SupervisorState::default() }
-    }
-
     /// The state of control.
     #[must_use]
     pub fn state(&self) -> State {

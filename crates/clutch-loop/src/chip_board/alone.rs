@@ -1,25 +1,27 @@
 //! A session with an image that has no host: its button is pressed, its lamp watched, and each of its codes compared with
-//! that of the same controller in this process.
+//! that of the scenario's controller in this process, on the same counts.
 
 use super::{ChipBoard, ChipFault, Counted};
 use crate::clearance::check;
 use crate::from_scenario::{self, BuiltRun};
-use crate::lockstep_board::InProcessBoard;
-use crate::lockstep_host::lockstep_host;
 use crate::lockstep_session::LockstepError;
 use crate::session::SessionError;
-use crate::virtual_time::{VirtualBoard, VirtualError, VirtualLoop, VirtualOptions};
-use clutch_core::supervisor::{Cause, State};
-use clutch_core::{FixedCounts, Planned};
-use clutch_log::CommandRecord;
+use crate::virtual_time::{VirtualBoard, VirtualError};
+use clutch_core::law::LawState;
+use clutch_core::supervisor::{BoardMode, Cause, Sample};
+use clutch_core::{
+    BeginningAt, Counts, DacCode, FixedCounts, Micros, Planned, Servo, Supervisor, SupervisorState,
+};
 use clutch_node::Outbox;
 use clutch_sim::engine::{Event, Motion};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_sim::{Metrics, Scenario};
 use std::path::{Path, PathBuf};
 
-/// Time for which the button is seen let go before it is pressed, and the longest that a press may need, ns.
-const BEFORE_NS: u64 = 60_000_000;
+/// Time for which the board is left alone before its button is pressed, ns.
+const BEFORE_NS: u64 = 1_100_000_000;
+/// The longest that a press may need, ns.
+const PRESS_NS: u64 = 100_000_000;
 /// Dark for so long is behind the last flash, ns.
 const PAUSE_NS: u64 = 500_000_000;
 /// Time in which any number of flashes has been seen, ns.
@@ -30,12 +32,16 @@ const FLASHES_NS: u64 = 10_000_000_000;
 pub struct AloneReport {
     /// Codes under control, tick by tick.
     pub codes: Vec<u16>,
-    /// Those of the same controller in this process.
+    /// Those of the scenario's controller in this process, on the same counts.
     pub expected: Vec<u16>,
+    /// Ticks of the scenario.
+    pub ticks: u64,
+    /// True if control goes on after the scenario's ticks: the image has a longer run.
+    pub goes_on: bool,
     /// Figures of the shaft's true motion under control.
     pub metrics: Metrics,
-    /// Flashes of the lamp after the end: one for the end of the path, the number of the cause for a fault; none if the
-    /// board does not flash.
+    /// Flashes of the lamp after the end: one for the end of the path, the number of the cause for a fault, 12 after a reset by
+    /// the board itself; none if the board does not flash.
     pub flashes: u32,
     /// The code that the converter has at the end.
     pub last_code: u16,
@@ -50,7 +56,7 @@ pub struct AloneReport {
 }
 
 impl AloneReport {
-    /// The first tick with another code than in this process, of those that both have.
+    /// The first tick with another code than in this process.
     #[must_use]
     pub fn differs(&self) -> Option<usize> {
         self.codes.iter().zip(&self.expected).position(|(here, there)| here != there)
@@ -59,7 +65,7 @@ impl AloneReport {
     /// True if the path was followed to its end, and nothing was reset on the way.
     #[must_use]
     pub fn done(&self) -> bool {
-        self.resets == 0 && self.flashes == 1 && self.codes.len() == self.expected.len()
+        self.resets == 0 && self.flashes == 1 && self.codes.len() as u64 == self.ticks
     }
 
     /// The cause of a fault, by the lamp; none at the end of the path.
@@ -79,11 +85,40 @@ pub struct AloneSession {
     changed: bool,
 }
 
+/// The scenario's controller, which sees what the chip sees.
+struct Twin {
+    servo: Servo<f32>,
+    supervisor: Supervisor<f32>,
+    state: SupervisorState<f32, LawState<f32>>,
+    sequence: u16,
+}
+
+impl Twin {
+    fn code(&mut self, now_ns: u64, counts: Counts, planned: impl Planned<f32>) -> u16 {
+        let sample = Sample {
+            sequence: self.sequence,
+            time: Micros((now_ns / 1000) as u32),
+            counts,
+            board: BoardMode::Driving,
+            encoder_fault: false,
+            converter_fault: false,
+            command_late: false,
+            superseded: false,
+            lateness: Micros(0),
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.supervisor.sample(&self.servo, &mut self.state, &sample, planned);
+        self.state.code().0
+    }
+}
+
 /// The run on its way.
-struct Course<'a> {
+struct Course<'a, P> {
     board: ChipBoard,
     now_ns: u64,
-    path: &'a dyn Planned<f32>,
+    path: &'a P,
+    twin: Twin,
+    expected: Vec<u16>,
     period: f64,
     radians_per_count: f64,
     origin: FixedCounts,
@@ -129,16 +164,24 @@ impl AloneSession {
     /// The chip does not start or ends; no press begins a run.
     pub fn run(&self, image: &Path) -> Result<AloneReport, LockstepError> {
         let scenario = &self.scenario;
-        let expected = self.expected()?;
         let spec = scenario.spec();
+        let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
         let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
         let period = spec.period.seconds();
         let board = ChipBoard::start(image, scenario, &self.faults, self.count.as_deref())?;
         let radians_per_count = board.rig().rig().encoder.radians_per_count();
+        let twin = Twin {
+            servo: built.servo,
+            supervisor: built.supervisor,
+            state: SupervisorState::default(),
+            sequence: 0,
+        };
         let mut course = Course {
             board,
             now_ns: 0,
             path: &path,
+            twin,
+            expected: Vec::new(),
             period,
             radians_per_count,
             origin: FixedCounts(0),
@@ -147,14 +190,17 @@ impl AloneSession {
             waiting: None,
         };
         course.begin()?;
-        course.drive(expected.len())?;
+        course.drive(built.ticks)?;
+        let goes_on = course.board.lamp();
         let flashes = course.flashes()?;
-        let Course { board, figures, codes, .. } = course;
+        let Course { board, figures, codes, expected, .. } = course;
         let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
         let last_code = board.code().0;
         Ok(AloneReport {
             codes,
             expected,
+            ticks: built.ticks,
+            goes_on,
             metrics: figures.finish(),
             flashes,
             last_code,
@@ -165,26 +211,14 @@ impl AloneSession {
         })
     }
 
-    /// The codes of the same run on a controller in this process.
-    fn expected(&self) -> Result<Vec<u16>, LockstepError> {
-        let scenario = &self.scenario;
-        let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
-        let (ticks, run) = (built.ticks + 1, &scenario.spec().run);
-        let duration = run.duration + 0.1;
-        let params =
-            VirtualOptions { record: true, duration, ticks, settle: run.settle, ..VirtualOptions::default() };
-        let station =
-            lockstep_host(scenario, &built, InProcessBoard::default(), ticks).map_err(SessionError::from)?;
-        let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
-        let ran = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from)?.run(&path)?;
-        let (_, commands) = ran.samples_and_commands();
-        // In the last period the run ends.
-        let under_control = |c: &&CommandRecord| c.state == State::Running as u8 && c.tick < built.ticks;
-        Ok(commands.iter().filter(under_control).map(|c| c.code).collect())
+    /// True if an image has no host, by its name.
+    #[must_use]
+    pub fn is_for(image: &Path) -> bool {
+        image.file_name().is_some_and(|name| name.to_string_lossy().contains("alone"))
     }
 }
 
-impl Course<'_> {
+impl<P: Planned<f32>> Course<'_, P> {
     /// The chip goes on to what it does next, but no further than to a time.
     fn step(&mut self, until_ns: u64) -> Result<(), VirtualError> {
         self.now_ns = self.board.next_ns().map_or(until_ns, |next| next.clamp(self.now_ns, until_ns));
@@ -197,24 +231,27 @@ impl Course<'_> {
         while self.now_ns < BEFORE_NS {
             self.step(BEFORE_NS)?;
         }
+        let present = DacCode(self.board.code().0);
         self.board.press(true);
         while !self.board.lamp() {
-            if self.now_ns >= 2 * BEFORE_NS {
+            if self.now_ns >= BEFORE_NS + PRESS_NS {
                 let why = "a press of its button does not light its lamp for good";
                 return Err(VirtualError::Refused(why.to_owned()));
             }
-            self.step(2 * BEFORE_NS)?;
+            self.step(BEFORE_NS + PRESS_NS)?;
         }
         self.origin = FixedCounts::from_counts(i64::from(self.board.rig().counts().0));
+        self.twin.supervisor.connect(&mut self.twin.state);
+        self.twin.supervisor.arm(&mut self.twin.state, present);
         self.sampled();
         self.board.press(false);
         Ok(())
     }
 
-    /// To the end of control, but for no more than some ticks beyond those that are expected.
-    fn drive(&mut self, expected: usize) -> Result<(), VirtualError> {
+    /// To the end of control, but for no more than some ticks beyond the scenario's.
+    fn drive(&mut self, ticks: u64) -> Result<(), VirtualError> {
         let mut samples = self.board.samples();
-        while self.codes.len() < expected + 10 {
+        while (self.codes.len() as u64) < ticks.saturating_add(10) {
             self.step(u64::MAX)?;
             if !self.board.lamp() {
                 self.measure();
@@ -236,6 +273,8 @@ impl Course<'_> {
         let target = target.minus::<f64>(FixedCounts(0)) * self.radians_per_count;
         let shaft = rig.shaft();
         self.waiting = Some((target - shaft.position, shaft.velocity, rig.time(), shaft.motion));
+        let planned = BeginningAt { planned: self.path, origin: self.origin };
+        self.expected.push(self.twin.code(self.now_ns, rig.counts(), planned));
         self.codes.push(self.board.code().0);
     }
 
@@ -257,11 +296,7 @@ impl Course<'_> {
         if lit {
             return Ok(0);
         }
-        // A program that begins anew flashes nothing.
-        while self.board.resets() == 0
-            && self.now_ns < end_ns
-            && !(flashes > 0 && !lit && self.now_ns - changed_ns > PAUSE_NS)
-        {
+        while self.now_ns < end_ns && !(flashes > 0 && !lit && self.now_ns - changed_ns > PAUSE_NS) {
             self.step(end_ns)?;
             if self.board.lamp() != lit {
                 (lit, changed_ns) = (!lit, self.now_ns);

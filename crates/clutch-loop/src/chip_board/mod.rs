@@ -225,10 +225,13 @@ impl ChipBoard {
         let before = self.volts_now();
         let faults = self.active(now_ns);
         self.last = self.chip.exchange(now_ns, ahead.counts().0, faults, bytes)?;
-        if self.button.is_some() && self.lamp() && self.armed_ns.is_none() {
+        if self.button == Some(true) && self.lamp() && self.armed_ns.is_none() {
             // This sample is the run's first.
             (self.armed_ns, self.moved_ns) = (Some(now_ns), Some(now_ns));
             self.state = BoardState::Running;
+        }
+        if self.button.is_some() && !self.lamp() && self.state == BoardState::Running {
+            self.state = BoardState::Stopped;
         }
         let sampling = self.started_ns.is_some() || self.moved_ns.is_some();
         let sampled = self.last.flags.has(Flags::SAMPLED) && sampling;

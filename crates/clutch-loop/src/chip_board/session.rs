@@ -21,22 +21,14 @@ pub enum ChipRole {
     Controller,
     /// The loop is closed on this machine.
     Daq,
-    /// The loop is closed on the chip, with the run that the image has compiled in, and no host: [`AloneSession`](super::AloneSession).
-    Alone,
 }
 
 impl ChipRole {
     /// The role of an image by its name.
     #[must_use]
     pub fn of(image: &Path) -> ChipRole {
-        let has = |word| image.file_name().is_some_and(|name| name.to_string_lossy().contains(word));
-        if has("daq") {
-            ChipRole::Daq
-        } else if has("alone") {
-            ChipRole::Alone
-        } else {
-            ChipRole::Controller
-        }
+        let daq = image.file_name().is_some_and(|name| name.to_string_lossy().contains("daq"));
+        if daq { ChipRole::Daq } else { ChipRole::Controller }
     }
 }
 
@@ -92,8 +84,8 @@ impl ChipSession {
         role: ChipRole,
     ) -> Result<Self, SessionError> {
         let single = match role {
+            ChipRole::Controller => from_scenario::in_single_precision(&scenario)?,
             ChipRole::Daq => None,
-            ChipRole::Controller | ChipRole::Alone => from_scenario::in_single_precision(&scenario)?,
         };
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
@@ -136,7 +128,7 @@ impl ChipSession {
     /// As [`ChipSession::run`].
     pub fn run_board(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
         match (self.role, self.scenario.scalar()) {
-            (ChipRole::Controller | ChipRole::Alone, _) => self.controller(image),
+            (ChipRole::Controller, _) => self.controller(image),
             (ChipRole::Daq, ScalarKind::F32) => self.daq::<f32>(image),
             (ChipRole::Daq, ScalarKind::F64) => self.daq::<f64>(image),
         }

@@ -8,7 +8,7 @@ use clutch_core::{
     BeginningAt, Counts, DacCode, Encoder, FixedCounts, Micros, ParamError, Planned, SafeState, Servo,
     SupervisorState, Target,
 };
-use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, Hardware};
+use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, Hardware, ResetCause};
 
 const BOOT_CODE: u16 = BOARD.boot_code;
 
@@ -20,6 +20,10 @@ struct Desk {
     encoder_fault: bool,
     code: u16,
     fed: u32,
+    /// Time that a sample needs up to its code, µs.
+    slow_us: u64,
+    /// A code is out that the watchdog has not been fed for.
+    put_out: bool,
 }
 
 impl Hardware for Desk {
@@ -37,8 +41,11 @@ impl Hardware for Desk {
     }
     fn put_out(&mut self, code: DacCode) {
         self.code = code.0;
+        self.now_us += self.slow_us;
+        self.put_out = true;
     }
     fn feed_watchdog(&mut self) {
+        assert!(std::mem::take(&mut self.put_out), "fed without a code");
         self.fed += 1;
     }
     fn send(&mut self, _frames: &[u8]) -> bool {
@@ -66,19 +73,34 @@ fn run(plan: &Plan) -> AloneRun<Pd<f32>, Ramp<f32>> {
 }
 
 /// Counts of a shaft that is driven, period by period: 54 °/s, not quite evenly.
-const STEPS: [i32; 4] = [3, 1, 5, 3];
+const STEPS: [i32; 4] = [3, 2, 4, 3];
 
 /// A controller and its board, whose shaft moves once it is driven.
 struct Bench {
     alone: OnRamp,
     desk: Desk,
     pressed: bool,
+    /// Periods in which the shaft has moved.
+    moved: usize,
 }
 
 impl Bench {
     fn new(plan: &Plan) -> Bench {
-        let alone = Alone::new(&run(plan), &BOARD).unwrap();
-        Bench { alone, desk: Desk { counts: 70, ..Desk::default() }, pressed: false }
+        Bench::on(plan, &BOARD)
+    }
+
+    fn on(plan: &Plan, board: &BoardParams) -> Bench {
+        let alone = Alone::new(&run(plan), board).unwrap();
+        Bench { alone, desk: Desk { counts: 70, ..Desk::default() }, pressed: false, moved: 0 }
+    }
+
+    /// A run that has gone on for some periods, with the button let go.
+    fn running(plan: &Plan) -> Bench {
+        let mut bench = Bench::new(plan);
+        bench.pass(1000);
+        bench.press(25);
+        assert_eq!(bench.state(), (State::Running, Cause::None));
+        bench
     }
 
     fn driving(&self) -> bool {
@@ -89,9 +111,10 @@ impl Bench {
     fn pass(&mut self, periods: u32) -> u16 {
         for _ in 0..periods {
             if self.driving() {
-                self.desk.counts += STEPS[self.desk.now_us as usize / 1000 % STEPS.len()];
+                self.desk.counts += STEPS[self.moved % STEPS.len()];
+                self.moved += 1;
             }
-            self.desk.now_us += 1000;
+            self.desk.now_us += u64::from(self.alone.period_us()) - self.desk.slow_us;
             let fed = self.desk.fed;
             self.alone.tick(&mut self.desk, self.pressed);
             assert_eq!(self.desk.fed, fed + 1, "the watchdog is fed once");
@@ -117,7 +140,7 @@ fn nothing_but_a_press_after_the_button_was_let_go_begins_a_run() {
     let mut bench = Bench::new(&Plan::new());
     // Held at power-up, for ever.
     bench.pressed = true;
-    assert_eq!(bench.pass(1000), BOOT_CODE);
+    assert_eq!(bench.pass(5000), BOOT_CODE);
     assert_eq!(bench.state(), (State::Ready, Cause::None));
     // Let go, and a contact that bounces for 15 ms at a time.
     bench.pressed = false;
@@ -147,7 +170,7 @@ fn its_codes_are_those_of_a_supervisor_with_the_law_of_the_list() {
     for start in [0, 4711] {
         let plan = Plan { start: FixedCounts(start), ticks: 300, ..Plan::new() };
         let mut bench = Bench::new(&plan);
-        bench.pass(50);
+        bench.pass(1000);
         bench.pressed = true;
         bench.pass(19);
         let servo = Servo::<f32>::new(&plan.servo).unwrap();
@@ -189,71 +212,163 @@ fn its_codes_are_those_of_a_supervisor_with_the_law_of_the_list() {
 }
 
 #[test]
-fn a_press_ends_a_run_at_once_and_the_next_two_begin_another() {
-    let mut bench = Bench::new(&Plan::new());
+fn a_press_ends_a_run_at_once_and_a_long_and_a_short_one_begin_another() {
+    let mut bench = Bench::running(&Plan::new());
     let hold = Plan::new().supervisor().safe_codes().hold.0;
-    bench.pass(30);
-    bench.press(25);
-    bench.pass(50);
-    assert_eq!(bench.state().0, State::Running);
     bench.pressed = true;
     assert_eq!(bench.pass(1), hold);
     assert_eq!(bench.state(), (State::Holding, Cause::Operator));
     // That press is used up, however long it lasts.
-    bench.pass(500);
+    bench.pass(5000);
     bench.pressed = false;
     bench.pass(30);
     assert_eq!(bench.state().0, State::Holding);
-    bench.press(25);
+    bench.press(999);
+    assert_eq!(bench.state().0, State::Holding);
+    bench.press(1000);
     assert_eq!((bench.state().0, bench.desk.code), (State::Ready, hold));
     // From where the shaft is by now.
+    bench.pass(1000);
     let here = i64::from(bench.desk.counts);
     bench.press(25);
     assert_eq!((bench.state().0, bench.alone.origin()), (State::Running, FixedCounts::from_counts(here)));
 }
 
 #[test]
-fn a_fault_latches_and_its_lamp_counts_the_cause() {
+fn presses_in_a_hurry_end_a_run_and_begin_none() {
+    let mut bench = Bench::running(&Plan::new());
+    for _ in 0..10 {
+        bench.press(100);
+        assert_eq!(bench.state(), (State::Holding, Cause::Operator));
+    }
+    // Nor after an acknowledgement that was as hurried.
+    bench.press(1000);
+    bench.press(100);
+    assert_eq!(bench.state().0, State::Ready);
+}
+
+#[test]
+fn a_contact_that_stays_closed_ends_the_run_that_it_began() {
+    let mut plan = Plan::new();
+    // The shaft of this desk is not what the law wants for so long.
+    plan.limits.limits.saturation_time = 60.0;
+    let mut bench = Bench::new(&plan);
+    bench.pass(1000);
+    bench.pressed = true;
+    bench.pass(1999);
+    assert_eq!(bench.state().0, State::Running);
+    bench.pass(1);
+    assert_eq!(bench.state(), (State::Holding, Cause::Operator));
+    bench.pass(5000);
+    assert_eq!(bench.state().0, State::Holding);
+}
+
+#[test]
+fn a_press_ends_a_run_5_ms_after_the_one_that_began_it() {
     let mut bench = Bench::new(&Plan::new());
-    assert!(!bench.alone.lamp());
+    bench.pass(1000);
+    bench.pressed = true;
     bench.pass(30);
-    bench.press(25);
+    for (let_go, ends) in [(4, false), (5, true)] {
+        bench.pressed = false;
+        bench.pass(let_go);
+        bench.pressed = true;
+        bench.pass(1);
+        assert_eq!(bench.state().0 == State::Holding, ends, "let go for {let_go} ms");
+    }
+}
+
+#[test]
+fn a_fault_latches_and_its_lamp_counts_the_cause() {
+    let mut bench = Bench::running(&Plan::new());
     assert!(bench.alone.lamp());
     bench.desk.encoder_fault = true;
     bench.pass(1);
     bench.desk.encoder_fault = false;
     assert_eq!(bench.state(), (State::Faulted, Cause::Board));
-    let mut flashes = |periods| {
-        let (mut lit, mut count) = (false, 0);
-        for _ in 0..periods {
-            bench.pass(1);
-            count += u32::from(lit && !bench.alone.lamp());
-            lit = bench.alone.lamp();
-        }
-        count
-    };
+    assert!(!bench.alone.lamp());
     // 12 of 0.4 s each, and a pause: as many in the same time behind them.
     let all = (2 * Cause::Board as u32 + 2) * 200;
-    assert_eq!((flashes(all), flashes(all)), (Cause::Board as u32, Cause::Board as u32));
+    assert_eq!([flashes(&mut bench, all), flashes(&mut bench, all)], [Cause::Board as u32; 2]);
     assert_eq!(bench.state().0, State::Faulted);
-    bench.press(25);
-    assert_eq!((bench.state(), bench.alone.lamp()), ((State::Ready, Cause::None), false));
+    bench.press(1000);
+    assert_eq!(bench.state(), (State::Ready, Cause::None));
+    // One each 2.2 s.
+    assert_eq!(flashes(&mut bench, 22_000), 10);
 }
 
-/// Before consent a fault begins with the output that is there, not with code 0: a ramp would let the brake go first.
+/// The flashes of the lamp in some periods.
+fn flashes(bench: &mut Bench, periods: u32) -> u32 {
+    let (mut lit, mut count) = (bench.alone.lamp(), 0);
+    for _ in 0..periods {
+        bench.pass(1);
+        count += u32::from(lit && !bench.alone.lamp());
+        lit = bench.alone.lamp();
+    }
+    count
+}
+
+/// A run is not begun again in a state that hides why the last one broke off.
 #[test]
-fn a_fault_before_consent_begins_with_the_boot_code() {
-    let mut plan = Plan::new();
-    // 2 V/s up from the boot code's 4 V, 2 mV a period.
-    plan.limits.on_fault = SafeState::ramp(2.0, 8.0);
-    let mut bench = Bench::new(&plan);
-    assert_eq!(bench.pass(50), BOOT_CODE);
-    bench.desk.encoder_fault = true;
-    let codes: Vec<u16> = (0..100).map(|_| bench.pass(1)).collect();
-    assert_eq!(bench.state(), (State::Faulted, Cause::Board));
-    assert!(codes.is_sorted() && codes[0] >= BOOT_CODE && codes[0] <= BOOT_CODE + 1, "{codes:?}");
-    // 0.2 V after 0.1 s, of 4.88 mV each.
-    assert!((i32::from(codes[99]) - i32::from(BOOT_CODE) - 41).abs() <= 1, "{codes:?}");
+fn a_program_that_begins_anew_after_a_fault_begins_as_faulted() {
+    for (started_by, state) in [
+        (ResetCause::Power, State::Ready),
+        (ResetCause::Pin, State::Ready),
+        (ResetCause::Watchdog, State::Faulted),
+        (ResetCause::Fault, State::Faulted),
+        (ResetCause::Clock, State::Faulted),
+    ] {
+        let mut bench = Bench::on(&Plan::new(), &BoardParams { started_by, ..BOARD });
+        assert_eq!(bench.pass(1000), BOOT_CODE, "{started_by:?}");
+        assert_eq!(bench.state().0, state, "{started_by:?}");
+        bench.press(25);
+        assert_eq!(bench.state().0 == State::Running, state == State::Ready, "{started_by:?}");
+    }
+}
+
+/// What the board is built into decides until a run has begun: not the safe state of a run that nobody asked for.
+#[test]
+fn a_fault_before_consent_leaves_the_boot_code() {
+    for on_fault in [SafeState::ramp(2.0, 8.0), SafeState::Release, SafeState::hold_then_release(5.0, 0.1)] {
+        let mut plan = Plan::new();
+        plan.limits.on_fault = on_fault;
+        let mut bench = Bench::new(&plan);
+        bench.pass(50);
+        bench.desk.encoder_fault = true;
+        for _ in 0..500 {
+            assert_eq!(bench.pass(1), BOOT_CODE, "{on_fault:?}");
+        }
+        assert_eq!(bench.state(), (State::Faulted, Cause::Board));
+    }
+}
+
+/// A ramp goes on to its end, and a brake that is to let go after a time does, although somebody has acknowledged the end.
+#[test]
+fn a_safe_state_goes_on_through_an_acknowledgement() {
+    for (on_fault, ends_at) in [
+        (SafeState::ramp(0.2, 9.0), 9.0),
+        (SafeState::ramp(0.2, 0.5), 0.5),
+        (SafeState::hold_then_release(5.0, 4.0), 0.0),
+    ] {
+        let mut plan = Plan::new();
+        plan.limits.on_fault = on_fault;
+        let mut bench = Bench::running(&plan);
+        let volts = |code: u16| f32::from(code) * 20.0 / 4096.0 - 10.0;
+        let begin = volts(bench.desk.code);
+        bench.pressed = true;
+        let first = volts(bench.pass(1));
+        // One step, not two: 0.2 mV of a ramp, or the voltage that holds.
+        let of_ramp = if matches!(on_fault, SafeState::Ramp(_)) { begin } else { 5.0 };
+        assert!((first - of_ramp).abs() < 0.006, "{on_fault:?}: {begin} V, {first} V");
+        bench.pressed = false;
+        bench.pass(30);
+        bench.press(1000);
+        assert_eq!(bench.state().0, State::Ready, "{on_fault:?}");
+        assert!((volts(bench.desk.code) - ends_at).abs() > 1.0, "{on_fault:?}: it is still on its way");
+        let end = volts(bench.pass(40_000));
+        assert!((end - ends_at).abs() < 0.006, "{on_fault:?}: {end} V");
+        assert_eq!(bench.state().0, State::Ready, "{on_fault:?}");
+    }
 }
 
 #[test]
@@ -261,9 +376,7 @@ fn a_law_that_gives_no_codes_is_ended_by_the_watchdog() {
     let mut plan = Plan::new();
     // A count that no shaft can have does not end control, and is not answered.
     plan.limits.limits.jumps = 128;
-    let mut bench = Bench::new(&plan);
-    bench.pass(30);
-    bench.press(25);
+    let mut bench = Bench::running(&plan);
     let before = bench.desk.code;
     for _ in 0..2 {
         bench.desk.counts += 5000;
@@ -273,6 +386,41 @@ fn a_law_that_gives_no_codes_is_ended_by_the_watchdog() {
     let hold = plan.supervisor().safe_codes().hold.0;
     assert_eq!(bench.pass(1), hold);
     assert_eq!(bench.state(), (State::Faulted, Cause::Board));
+}
+
+#[test]
+fn answers_that_are_too_late_end_a_run() {
+    let plan = Plan::new();
+    let mut bench = Bench::running(&plan);
+    bench.desk.slow_us = u64::from(plan.limits.limits.deadline.0);
+    bench.pass(40);
+    assert_eq!(bench.state().0, State::Running);
+    bench.desk.slow_us += 1;
+    bench.pass(40);
+    assert_eq!(bench.state(), (State::Faulted, Cause::Deadline));
+}
+
+/// Times of 32 bits and numbers of 16, each beyond its end in a run; and other periods than a millisecond.
+#[test]
+fn a_run_goes_on_where_its_numbers_begin_anew() {
+    for (period_us, periods) in [(500, 70_000), (1000, 70_000), (4000, 2000)] {
+        let mut plan = Plan::new();
+        plan.servo.period = Micros(period_us);
+        plan.watchdog = Micros(3 * period_us);
+        plan.limits.limits.saturation_time = 60.0;
+        plan.reference = ReferenceParams::ramp(54.0_f32.to_radians() * 1000.0 / period_us as f32);
+        plan.limits.limits.following_error = 1.0;
+        let mut bench = Bench::new(&plan);
+        bench.desk.now_us = (1 << 32) - 2_500_000;
+        bench.pass(2_000_000 / period_us);
+        bench.press(20_000 / period_us);
+        bench.pass(periods);
+        assert_eq!(bench.state(), (State::Running, Cause::None), "{period_us} µs");
+        assert!(bench.desk.now_us > 1 << 32, "{period_us} µs");
+        bench.pressed = true;
+        bench.pass(1);
+        assert_eq!(bench.state(), (State::Holding, Cause::Operator), "{period_us} µs");
+    }
 }
 
 #[test]
@@ -288,6 +436,16 @@ fn a_run_of_another_board_is_refused() {
     ] {
         assert_eq!(of(board), Some(AloneMisfit::Converter), "{board:?}");
     }
+    // 0.4 mV are below what a board says of itself.
+    let mut trimmed = run(&Plan::new());
+    trimmed.servo.dac.highest = 10.0004;
+    assert_eq!(Alone::new(&trimmed, &BOARD).err(), None);
+    for watchdog in [1999, 30_001] {
+        let mut run = run(&Plan::new());
+        run.watchdog = Micros(watchdog);
+        assert_eq!(Alone::new(&run, &BOARD).err(), Some(AloneMisfit::Watchdog(Micros(watchdog))));
+    }
+    assert!(matches!(of(BoardParams { boot_code: 4096, ..BOARD }), Some(AloneMisfit::Board(_))));
     let slow = of(BoardParams { period_min_us: 2000, ..BOARD });
     assert_eq!(slow, Some(AloneMisfit::Period(Micros(1000))));
     let mut law = run(&Plan::new());

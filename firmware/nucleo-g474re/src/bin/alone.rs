@@ -32,6 +32,7 @@ async fn refuse(board: &mut Board<READ_BACK>) -> ! {
     let (mut beat, mut lit) = (run::every(board::WATCHDOG_US / 2), 0_u8);
     loop {
         beat.next().await;
+        board.put_out(board::BOOT_CODE);
         board.feed_watchdog();
         lit = lit.wrapping_add(1);
         button::light(lit & 16 != 0);
