@@ -134,3 +134,32 @@ fn the_page_for_an_embedded_engineer_is_true() {
         assert_eq!(report["cause"], "Done", "{line}: {report}");
     }
 }
+
+/// A run without a host: figures, codes beside this machine's, what the lamp says, and what such an image cannot have.
+#[test]
+fn a_run_without_a_host_is_told_and_ends_with_its_exit_code() {
+    if image("nucleo-alone").is_none() {
+        return;
+    }
+    let _beside = beside();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let run = |more: &[&str]| {
+        let mut hil = Command::new(command());
+        hil.args(["hil", "examples/nucleo_smc_2.toml", "--image", "nucleo-alone"]).args(more);
+        hil.current_dir(&root).env_remove("CLUTCH_IMAGES").stdin(Stdio::null()).output().expect("it starts")
+    };
+    for (more, code, words) in [
+        (&[][..], 0, "each code is that of the scenario's controller"),
+        (&["--chip-fault", "converter-stuck:at=0.3"], 3, "the lamp flashes 12 times, Board"),
+        (&["--set", "run.duration_s=2"], 1, "the image has a longer run"),
+        (&["--log", "run.mcap"], 1, "has no line to a host"),
+        (&["--fault", "silence:at=1"], 1, "has no line to a host"),
+    ] {
+        let done = run(more);
+        let text = shown(&done).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(done.status.code() == Some(code) && text.contains(words), "{more:?}: {text}");
+    }
+    let report: Value = serde_json::from_slice(&run(&["--json"]).stdout).expect("JSON");
+    assert_eq!((&report["differs_at_tick"], &report["flashes"]), (&Value::Null, &Value::from(1)));
+    assert_eq!((&report["ticks"], &report["goes_on"]), (&Value::from(10_000), &Value::from(false)));
+}

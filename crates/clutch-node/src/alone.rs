@@ -263,7 +263,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         if had {
             self.button.used = true;
             if driving {
-                self.supervisor.stop(&mut self.state, Cause::Operator);
+                self.end(Cause::Operator);
             } else {
                 self.agree(now_us);
             }
@@ -283,11 +283,26 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
         }
     }
 
+    /// The end of control, as wanted.
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
+    fn end(&mut self, cause: Cause) {
+        self.supervisor.stop(&mut self.state, cause);
+    }
+
+    /// The law has given no code for too long.
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
+    fn silent(&mut self) {
+        self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
+    }
+
     /// The sample: judged, and answered.
     fn sample(&mut self, now_us: u32, counts: Counts, (encoder_fault, converter_fault): (bool, bool)) {
         if self.driving() && now_us.wrapping_sub(self.answered_us) >= self.watchdog.0 {
-            // The law has given no code for too long.
-            self.supervisor.board_fault(&mut self.state, f32::from(BoardFault::Watchdog as u8));
+            self.silent();
         }
         let board = match self.state.state() {
             State::Ready => BoardMode::Ready,
@@ -316,7 +331,7 @@ impl<L: Listed<f32>, P: OneKind<f32>> Alone<L, P> {
             self.answered_us = now_us;
         }
         if cycle.state == State::Running && self.state.tick().saturating_add(1) >= self.ticks {
-            self.supervisor.stop(&mut self.state, Cause::Done);
+            self.end(Cause::Done);
         }
     }
 

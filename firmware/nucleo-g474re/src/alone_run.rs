@@ -8,7 +8,7 @@
 //!
 //! sticks: not excluded, neither by a bound nor by stability.
 //!
-//! Written by `clutch scenario rust`, 0.1.0+5d613feef88e.
+//! Written by `clutch scenario rust`, 0.1.0+46cb33152cc7.
 #![allow(unused_imports, reason = "each run has other choices")]
 
 use clutch_core::edge_timed::*;

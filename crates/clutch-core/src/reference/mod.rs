@@ -16,6 +16,7 @@
 //! | table, linear | jumps at knots | 0 |
 //! | table, cubic | continuous | jumps at knots; never overshoots (Fritsch and Butland 1984) |
 
+mod one_kind;
 mod profile;
 mod scale;
 mod table;
@@ -24,26 +25,14 @@ mod target;
 mod tests;
 mod wave;
 
-pub use profile::{JerkLimited, MinimumJerk, Profile, Trapezoid};
+pub use one_kind::OneKind;
+pub use profile::{JerkLimited, MinimumJerk, Profile, Ramp, Trapezoid};
 pub use table::{Interpolation, Knot, Prepared, Steepness, Table, Tabulated};
 pub use target::Target;
 pub use wave::{Chirp, Sine, Wave};
 
-use crate::params::Range;
-use crate::{Encoder, FixedCounts, Micros, ParamError, Planned, Real};
+use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 use scale::Scale;
-
-crate::params! {
-    /// Constant rate from the first tick: the paper's path.
-    pub struct Ramp<T> {
-        /// Rate, to which the velocity jumps at the start; with a brake above 0.
-        rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
-    }
-    relations(p) {
-        /// Counts hold the rate.
-        RATE: rate, "a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
-    }
-}
 
 crate::choice! {
     /// Planned path of the shaft.
@@ -73,40 +62,6 @@ impl<T> ReferenceParams<'_, T> {
     pub const fn ramp(rate: T) -> Self {
         ReferenceParams::Ramp(Ramp { rate })
     }
-}
-
-/// A path of one kind, for a program that has no other: each kind's code then stays out of it but this one's.
-pub trait OneKind<T: Real> {
-    /// The checked path.
-    type Path: Planned<T>;
-
-    /// The checked path, from position 0 on.
-    ///
-    /// # Errors
-    /// The first parameter out of range, by name.
-    fn path(&self, encoder: Encoder, period: Micros) -> Result<Self::Path, ParamError<T>>;
-}
-
-/// A kind whose path is of another type, from factors between its units and counts.
-macro_rules! one_kind {
-    ($($kind:ident $path:ident $made:ident;)+) => {$(
-        impl<T: Real> OneKind<T> for $kind<T> {
-            type Path = $path<T>;
-
-            fn path(&self, encoder: Encoder, period: Micros) -> Result<$path<T>, ParamError<T>> {
-                $path::$made(self, Scale::new(encoder, period)?)
-            }
-        }
-    )+};
-}
-
-one_kind! {
-    Ramp Profile ramp;
-    Trapezoid Profile trapezoid;
-    JerkLimited Profile jerk_limited;
-    MinimumJerk Profile minimum_jerk;
-    Sine Wave sine;
-    Chirp Wave chirp;
 }
 
 /// A checked path.

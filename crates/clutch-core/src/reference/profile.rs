@@ -1,10 +1,21 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
-use super::Ramp;
 use super::scale::{Scale, advance};
 use super::target::Target;
 use crate::params::{Range, Table};
 use crate::{FixedCounts, ParamError, Planned, Real};
+
+crate::params! {
+    /// Constant rate from the first tick: the paper's path.
+    pub struct Ramp<T> {
+        /// Rate, to which the velocity jumps at the start; with a brake above 0.
+        rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
+    }
+    relations(p) {
+        /// Counts hold the rate.
+        RATE: rate, "a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+    }
+}
 
 crate::params! {
     /// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.

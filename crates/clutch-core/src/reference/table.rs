@@ -1,6 +1,5 @@
 //! A path through points in time.
 
-use super::OneKind;
 use super::target::Target;
 use crate::params::{self, Editor, Kind, Leaf, Range, Unit};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Planned, Real};
@@ -103,15 +102,6 @@ impl<T: Real> Planned<T> for Tabulated<'_, T> {
     #[inline]
     fn target(&self, tick: u64) -> Target<T> {
         self.at(tick)
-    }
-}
-
-impl<'a, T: Real> OneKind<T> for Table<'a> {
-    type Path = Tabulated<'a, T>;
-
-    fn path(&self, encoder: Encoder, period: Micros) -> Result<Tabulated<'a, T>, ParamError<T>> {
-        period.period::<T>()?;
-        Tabulated::new(self, encoder, period)
     }
 }
 
