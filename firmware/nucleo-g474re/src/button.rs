@@ -4,7 +4,8 @@ use embassy_stm32::pac;
 use embassy_stm32::pac::gpio::vals::{Idr, Moder, Odr, Pupdr};
 
 /// Level of PC13 while the button is pressed, as the maker's own driver for this board has it. A description of the board by
-/// others has the low level: if it is right, a run begins and ends when the button is let go, and the first power-on shows it.
+/// others has the low level: if it is right, a run begins when the button is let go and ends after 2 s, and the first
+/// power-on shows it.
 const PRESSED: Idr = Idr::HIGH;
 
 const BUTTON: usize = 13;
