@@ -2,7 +2,7 @@
 
 use crate::emulator::Counts;
 use anyhow::{Context, Result};
-use clutch_loop::chip_board::{AloneSession, ChipOptions, ChipRole, ChipSession, Counted};
+use clutch_loop::chip_board::{AloneSession, ChipEnd, ChipOptions, ChipRole, ChipSession, Counted};
 use clutch_loop::lockstep_session::LockstepOptions;
 use clutch_sim::Scenario;
 use std::collections::BTreeMap;
@@ -118,18 +118,18 @@ impl Run {
             ..ChipOptions::default()
         };
         let image = images.join(self.image);
-        let counted = if AloneSession::is_for(&image) {
-            AloneSession::new(scenario, true, chip.faults, chip.count)?.run(&image)?.counted
+        let end = if AloneSession::is_for(&image) {
+            AloneSession::new(scenario, true, chip.faults, chip.count)?.run(&image)?.chip
         } else {
             self.with_host(scenario, chip, &image)?
         };
         std::fs::remove_file(&file)?;
-        counted.context("nothing was counted")
+        end.counted.context("nothing was counted")
     }
 
-    fn with_host(&self, scenario: Scenario, chip: ChipOptions, image: &Path) -> Result<Option<Counted>> {
+    fn with_host(&self, scenario: Scenario, chip: ChipOptions, image: &Path) -> Result<ChipEnd> {
         let options = LockstepOptions { uncertified: true, seed: 1, ..LockstepOptions::default() };
-        Ok(ChipSession::new(scenario, options, chip, ChipRole::of(image))?.run(image)?.counted)
+        Ok(ChipSession::new(scenario, options, chip, ChipRole::of(image))?.run(image)?.chip)
     }
 }
 

@@ -4,8 +4,8 @@
 use crate::{beside, equal, on, simulate};
 use clutch_core::supervisor::{Cause, State};
 use clutch_loop::chip_board::{
-    AloneReport, AloneSession, ChipBoard, ChipFault, ChipFaultKind, ChipKind, ChipOptions, ChipReport,
-    ChipRole, ChipSession,
+    AloneReport, AloneSession, ChipBoard, ChipEnd, ChipFault, ChipFaultKind, ChipKind, ChipOptions,
+    ChipReport, ChipRole, ChipSession,
 };
 use clutch_loop::lockstep_board::InProcessBoard;
 use clutch_loop::lockstep_session::LockstepOptions;
@@ -65,7 +65,11 @@ fn figures_and_codes_are_the_simulations(name: &str, role: ChipRole, law: &str) 
     let chip = ChipOptions { record: true, ..ChipOptions::default() };
     let report = session(&scenario, role, chip).run(&image).expect("the chip runs");
     equal(&format!("{law} on {name}"), &report.ran, &simulate(&scenario));
-    assert_eq!((report.resets, report.dead, report.floating), (0, false, false), "{law} on {name}");
+    assert_eq!(
+        (report.chip.resets, report.chip.dead, report.chip.floating),
+        (0, false, false),
+        "{law} on {name}"
+    );
     assert_eq!(report.ran.standing.cause, Cause::Done, "{law} on {name}");
 }
 
@@ -102,7 +106,7 @@ fn the_prefetch_of_the_flash_is_on_in_the_images_of_the_nucleo() {
         let chip = ChipOptions { count: Some(file.clone()), ..ChipOptions::default() };
         let report = session(&scenario("smc", 0.2), role, chip).run(&image).expect("the chip runs");
         std::fs::remove_file(&file).expect("the counts are there");
-        let counted = report.counted.expect("instructions are counted");
+        let counted = report.chip.counted.expect("instructions are counted");
         let mean = |key: &str| counted["period"][key]["mean"].as_f64().expect("a number");
         let (best, without) = (mean("estimated_us"), mean("estimated_us_without_prefetch"));
         assert!(0.0 < best && best < 0.8 * without, "{name}: {best} µs, {without} µs without");
@@ -183,12 +187,12 @@ fn a_controller_without_a_host_is_the_simulation_bit_for_bit() {
     let simulated = simulate(&scenario);
     assert_eq!(ran.codes, simulated.trace.code);
     assert_eq!((ran.codes.len(), ran.differs(), ran.done(), ran.goes_on), (10_000, None, true, false));
-    assert_eq!((ran.flashes, ran.fault(), ran.resets, ran.dead), (1, None, 0, false));
+    assert_eq!((ran.flashes, ran.fault(), ran.chip.resets, ran.chip.dead), (1, None, 0, false));
     let figures = Metrics { stick_time_fraction: simulated.metrics.stick_time_fraction, ..ran.metrics };
     assert_eq!(figures, simulated.metrics);
     assert!((ran.metrics.stick_time_fraction - simulated.metrics.stick_time_fraction).abs() < 1e-12);
     // 4.5 V of 10 V: the safe state of the scenario, not the code of power-up.
-    assert_eq!(ran.last_code, 1843);
+    assert_eq!(ran.chip.code, 1843);
 }
 
 #[test]
@@ -208,16 +212,16 @@ fn a_chip_without_a_host_that_breaks_ends_control_at_once_and_its_lamp_says_why(
     for kind in [Undefined, Panic] {
         let ran = broken(kind);
         // The program begins anew as Faulted.
-        assert_eq!((ran.resets, ran.flashes, ran.last_code), (1, 12, BOOT_CODE), "{kind:?}");
+        assert_eq!((ran.chip.resets, ran.flashes, ran.chip.code), (1, 12, BOOT_CODE), "{kind:?}");
     }
     for kind in [SupplyLow, ConverterStuck] {
         let ran = broken(kind);
         let code = if kind == ConverterStuck { ran.codes[299] } else { 1843 };
-        assert_eq!((ran.resets, ran.fault(), ran.last_code), (0, Some(Cause::Board), code), "{kind:?}");
+        assert_eq!((ran.chip.resets, ran.fault(), ran.chip.code), (0, Some(Cause::Board), code), "{kind:?}");
     }
     // The lamp stays lit until the watchdog resets the chip.
     let (_, ran) = without_a_host(&image, vec![ChipFault { kind: Hang, at: Some(0.3) }]);
-    assert_eq!((ran.resets, ran.done(), ran.flashes, ran.last_code), (1, false, 12, BOOT_CODE));
+    assert_eq!((ran.chip.resets, ran.done(), ran.flashes, ran.chip.code), (1, false, 12, BOOT_CODE));
 }
 
 /// A scenario with other numbers than the image's, and one that is shorter.
@@ -263,7 +267,8 @@ fn a_program_that_cannot_go_on_is_reset_into_its_boot_code() {
         use ChipFaultKind::{Hang, Nmi, Panic, StackOverflow, Undefined, Unexpected};
         for kind in could_be(name, [Hang, Undefined, Nmi, Unexpected, StackOverflow, Panic]) {
             let what = format!("{kind:?} on {name}");
-            let ChipReport { ran, resets, dead, floating, .. } = broken(&image, role, kind, Some(0.3));
+            let ChipReport { ran, chip: ChipEnd { resets, dead, floating, .. } } =
+                broken(&image, role, kind, Some(0.3));
             let expected = (State::Faulted, Cause::Silence, Some(BoardState::Boot));
             assert_eq!((ends(&ran), resets), (expected, 1), "{what}");
             assert_eq!((dead, floating, ran.last_code), (false, false, BOOT_CODE), "{what}");
@@ -375,7 +380,7 @@ fn a_converter_that_does_not_follow_ends_the_run() {
     for (name, role) in IMAGES {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, dead, .. } =
+        let ChipReport { ran, chip: ChipEnd { resets, dead, .. } } =
             broken(&image, role, ChipFaultKind::ConverterStuck, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!((resets, dead), (0, false), "{name}");
@@ -390,7 +395,8 @@ fn an_amplifier_that_does_not_follow_ends_the_run_where_its_voltage_is_read_back
         // Without a fault it is as any other.
         figures_and_codes_are_the_simulations(&wired, role, "smc");
         let _beside = beside();
-        let ChipReport { ran, resets, .. } = broken(&with, role, ChipFaultKind::Amplifier, Some(0.3));
+        let ChipReport { ran, chip: ChipEnd { resets, .. } } =
+            broken(&with, role, ChipFaultKind::Amplifier, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!(resets, 0, "{name}");
         // Three voltages in a row that are off, the first of which a period later.
@@ -409,7 +415,8 @@ fn a_supply_that_is_too_low_for_the_converter_ends_the_run() {
     for (name, role) in IMAGES.into_iter().filter(|(name, _)| !pico(name)) {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, .. } = broken(&image, role, ChipFaultKind::SupplyLow, Some(0.3));
+        let ChipReport { ran, chip: ChipEnd { resets, .. } } =
+            broken(&image, role, ChipFaultKind::SupplyLow, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!(resets, 0, "{name}");
     }
@@ -420,7 +427,8 @@ fn an_encoder_whose_signals_change_both_at_once_ends_the_run() {
     for (name, role) in IMAGES.into_iter().filter(|(name, _)| pico(name)) {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, .. } = broken(&image, role, ChipFaultKind::EncoderSkip, Some(0.3));
+        let ChipReport { ran, chip: ChipEnd { resets, .. } } =
+            broken(&image, role, ChipFaultKind::EncoderSkip, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!(resets, 0, "{name}");
     }
@@ -431,7 +439,7 @@ fn a_crystal_that_stops_leads_to_a_reset_and_then_to_what_the_wiring_holds() {
     for (name, role) in IMAGES {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, dead, floating, .. } =
+        let ChipReport { ran, chip: ChipEnd { resets, dead, floating, .. } } =
             broken(&image, role, ChipFaultKind::Crystal, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Silence, Some(BoardState::Boot)), "{name}");
         assert_eq!((resets, dead, floating), (1, true, true), "{name}");
@@ -443,7 +451,7 @@ fn a_crystal_that_never_starts_leaves_the_output_to_the_wiring() {
     for (name, role) in IMAGES {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, dead, floating, .. } =
+        let ChipReport { ran, chip: ChipEnd { resets, dead, floating, .. } } =
             broken(&image, role, ChipFaultKind::Crystal, None);
         assert_eq!(ends(&ran), (State::Disconnected, Cause::None, Some(BoardState::Boot)), "{name}");
         assert_eq!((resets, dead, floating), (0, true, true), "{name}");
@@ -455,7 +463,8 @@ fn an_overrun_of_the_line_costs_one_frame() {
     for (name, role) in IMAGES.into_iter().chain([PICO_DAQ]) {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        let ChipReport { ran, resets, .. } = broken(&image, role, ChipFaultKind::Overrun, Some(0.3));
+        let ChipReport { ran, chip: ChipEnd { resets, .. } } =
+            broken(&image, role, ChipFaultKind::Overrun, Some(0.3));
         assert_eq!(ends(&ran), (State::Holding, Cause::Done, Some(BoardState::Stopped)), "{name}");
         assert_eq!((resets, ran.unanswered), (0, 0), "{name}");
     }

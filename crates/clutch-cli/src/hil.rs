@@ -12,7 +12,7 @@ use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_loop::cause_words::cause_text;
 use clutch_loop::chip_board::{
-    AloneReport, AloneSession, ChipFault, ChipKind, ChipOptions, ChipRole, ChipSession,
+    AloneReport, AloneSession, ChipEnd, ChipFault, ChipKind, ChipOptions, ChipRole, ChipSession,
 };
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
@@ -21,7 +21,7 @@ use clutch_loop::onlooker::Looking;
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
 use clutch_loop::virtual_time::VirtualReport as Ran;
-use clutch_sim::Scenario;
+use clutch_sim::{Metrics, Scenario};
 use std::path::PathBuf;
 
 /// Runs the loop on an emulated board, with the simulated rig as its encoder and converter.
@@ -119,14 +119,14 @@ impl Hil {
             return Ok(Exit::NotCertified);
         };
         let session = session.looked_at(self.looking()?);
-        tell(session.note());
+        tell(session.admitted().note());
         let started = std::time::Instant::now();
         let ran = match self.link {
             Link::Memory => session.run(|| QemuBoard::start(&self.image))?,
             Link::Uart => session.run(|| QemuSerialBoard::start(&self.image))?,
         };
         let took = started.elapsed().as_secs_f64();
-        let scenario = &session.scenario().clone();
+        let scenario = &session.admitted().scenario().clone();
         drop(session); // its views have seen the end of it, and the terminal is free
         report(
             self.json,
@@ -162,26 +162,20 @@ impl Hil {
         let session = ChipSession::new(self.load()?, self.options(), chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
         let session = session.looked_at(self.looking()?);
-        tell(session.note());
+        tell(session.admitted().note());
         let started = std::time::Instant::now();
         let on_chip = session.run(&self.image)?;
         let took = started.elapsed().as_secs_f64();
-        let (scenario, ran) = (&session.scenario().clone(), &on_chip.ran);
+        let (scenario, ran) = (&session.admitted().scenario().clone(), &on_chip.ran);
         drop(session);
         let all = || {
             let mut all = summary(scenario, ran, took);
-            all["chip"] = serde_json::json!({
-                "resets": on_chip.resets,
-                "dead": on_chip.dead,
-                "floating": on_chip.floating,
-                "code": ran.last_code,
-                "counted": on_chip.counted,
-            });
+            all["chip"] = serde_json::json!(on_chip.chip);
             json(&all)
         };
         report(self.json, all, || {
             self.text(scenario, ran, &format!("the model of an {}", kind.name()), took)
-                + &chip_text(on_chip.resets, on_chip.dead, on_chip.floating)
+                + &chip_text(&on_chip.chip)
         })?;
         Ok(exit(ran))
     }
@@ -196,28 +190,22 @@ impl Hil {
         }
         let session = AloneSession::new(self.load()?, self.uncertified, chip.faults, chip.count);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
-        tell(session.note());
+        tell(session.admitted().note());
         let started = std::time::Instant::now();
         let ran = session.run(&self.image)?;
         let took = started.elapsed().as_secs_f64();
-        let scenario = session.scenario();
+        let scenario = session.admitted().scenario();
         let all = || {
-            json(&serde_json::json!({
-                "scenario": scenario.name(),
-                "version": env!("CARGO_PKG_VERSION"),
-                "seed": scenario.spec().run.seed,
-                "ticks": ran.codes.len(),
-                "took_s": took,
-                "metrics": ran.metrics,
-                "differs_at_tick": ran.differs(),
-                "goes_on": ran.goes_on,
-                "flashes": ran.flashes,
-                "cause": ran.fault().map(|cause| format!("{cause:?}")),
-                "chip": chip_json(&ran),
-            }))
+            let mut all = base(scenario, ran.codes.len() as u64, &ran.metrics, took);
+            all["differs_at_tick"] = serde_json::json!(ran.differs());
+            all["goes_on"] = ran.goes_on.into();
+            all["flashes"] = ran.flashes.into();
+            all["cause"] = serde_json::json!(ran.fault().map(|cause| format!("{cause:?}")));
+            all["chip"] = serde_json::json!(ran.chip);
+            json(&all)
         };
         report(self.json, all, || alone_text(scenario, &ran, kind, took))?;
-        let fault = ran.resets > 0 || !(ran.goes_on || ran.flashes == 1);
+        let fault = ran.chip.resets > 0 || !(ran.goes_on || ran.flashes == 1);
         Ok(match (ran.done(), ran.differs()) {
             (true, None) => Exit::Done,
             _ if fault => Exit::Fault,
@@ -262,14 +250,7 @@ impl Hil {
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {
-        let title = format!(
-            "{}\n{} ticks on {board} in {took:.1} s, seed {}\nfigures over {} s after settling",
-            scenario.name(),
-            ran.answers,
-            scenario.spec().run.seed,
-            number(ran.metrics.measured_s)
-        );
-        let mut text = quantities(&title, &sim::figures(&ran.metrics));
+        let mut text = figures(scenario, board, ran.answers, &ran.metrics, took);
         if let Some(file) = &self.log {
             text += &format!("log: {0}; clutch replay {0}\n", file.display());
         }
@@ -293,21 +274,25 @@ impl Hil {
     }
 }
 
+/// The figures of a run, under its title.
+fn figures(scenario: &Scenario, board: &str, ticks: u64, metrics: &Metrics, took: f64) -> String {
+    let title = format!(
+        "{}\n{ticks} ticks on {board} in {took:.1} s, seed {}\nfigures over {} s after settling",
+        scenario.name(),
+        scenario.spec().run.seed,
+        number(metrics.measured_s)
+    );
+    quantities(&title, &sim::figures(metrics))
+}
+
 /// The figures of a run without a host, its codes beside those of this machine, and what the lamp says.
 fn alone_text(scenario: &Scenario, ran: &AloneReport, kind: ChipKind, took: f64) -> String {
-    let title = format!(
-        "{}\n{} ticks on the model of an {} in {took:.1} s, seed {}\nfigures over {} s after settling",
-        scenario.name(),
-        ran.codes.len(),
-        kind.name(),
-        scenario.spec().run.seed,
-        number(ran.metrics.measured_s)
-    );
-    let mut text = quantities(&title, &sim::figures(&ran.metrics));
+    let board = format!("the model of an {}", kind.name());
+    let mut text = figures(scenario, &board, ran.codes.len() as u64, &ran.metrics, took);
     let code = |codes: &[u16], tick: usize| codes.get(tick).map_or("none".to_owned(), u16::to_string);
     text += &paragraph(&match ran.differs() {
         None => "each code is that of the scenario's controller on this machine".to_owned(),
-        Some(tick) if ran.resets == 0 && ran.fault().is_none() => format!(
+        Some(tick) if ran.chip.resets == 0 && ran.fault().is_none() => format!(
             "tick {tick}: its code is {}, that of the scenario's controller on this machine {}. The image has its run compiled \
              in: is it this scenario's (clutch scenario rust)?",
             code(&ran.codes, tick),
@@ -336,18 +321,7 @@ fn alone_text(scenario: &Scenario, ran: &AloneReport, kind: ChipKind, took: f64)
         }
         (n, None) => format!("FAULT: control ended after {ticks} ticks; the lamp flashes {n} times"),
     });
-    text + &chip_text(ran.resets, ran.dead, ran.floating)
-}
-
-/// The state of the chip at the end.
-fn chip_json(ran: &AloneReport) -> serde_json::Value {
-    serde_json::json!({
-        "resets": ran.resets,
-        "dead": ran.dead,
-        "floating": ran.floating,
-        "code": ran.last_code,
-        "counted": ran.counted,
-    })
+    text + &chip_text(&ran.chip)
 }
 
 /// A remark, on standard error.
@@ -367,33 +341,40 @@ fn exit(ran: &Ran) -> Exit {
 }
 
 /// The state of the chip at the end, where it is not as always.
-fn chip_text(resets: u32, dead: bool, floating: bool) -> String {
+fn chip_text(chip: &ChipEnd) -> String {
     let mut text = String::new();
-    if resets > 0 {
-        text += &format!("the chip was reset: {resets}\n");
+    if chip.resets > 0 {
+        text += &format!("the chip was reset: {}\n", chip.resets);
     }
-    if dead {
+    if chip.dead {
         text += "the chip's program does not run any more\n";
     }
-    if floating {
+    if chip.floating {
         text += "the converter decides nothing: divider or switch at the driver's input hold\n";
     }
     text
 }
 
-fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> serde_json::Value {
+/// The rows that each summary begins with.
+fn base(scenario: &Scenario, ticks: u64, metrics: &Metrics, took: f64) -> serde_json::Value {
     serde_json::json!({
         "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "seed": scenario.spec().run.seed,
-        "ticks": ran.answers,
+        "ticks": ticks,
         "took_s": took,
-        "metrics": ran.metrics,
-        "state": format!("{:?}", ran.standing.state),
-        "cause": format!("{:?}", ran.standing.cause),
-        "cause_text": cause_text(ran.standing.cause, ran.standing.value, true, ran.stopped),
-        "value": ran.standing.value,
-        "board": ran.board.map(|s| format!("{s:?}")),
-        "lost": ran.standing.lost,
+        "metrics": metrics,
     })
+}
+
+fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> serde_json::Value {
+    let standing = &ran.standing;
+    let mut all = base(scenario, ran.answers, &ran.metrics, took);
+    all["state"] = format!("{:?}", standing.state).into();
+    all["cause"] = format!("{:?}", standing.cause).into();
+    all["cause_text"] = cause_text(standing.cause, standing.value, true, ran.stopped).into();
+    all["value"] = standing.value.into();
+    all["board"] = serde_json::json!(ran.board.map(|s| format!("{s:?}")));
+    all["lost"] = standing.lost.into();
+    all
 }

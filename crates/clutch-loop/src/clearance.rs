@@ -1,5 +1,6 @@
 //! May a scenario run on a board?
 
+use crate::from_scenario;
 use clutch_core::ActuatorKind;
 use clutch_core::reference::ReferenceParams;
 use clutch_sim::scenario::{CERTIFIED, CertificateError, Plan, Proven, STICKS, Sampled};
@@ -118,6 +119,58 @@ impl Cleared {
             ));
         }
         remarks
+    }
+}
+
+/// A scenario that may run on a board, as it will.
+#[derive(Clone, Debug)]
+pub struct Admitted {
+    scenario: Scenario,
+    cleared: Cleared,
+    /// It was not in single precision.
+    changed: bool,
+}
+
+impl Admitted {
+    /// A scenario as it is.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn new(scenario: Scenario, uncertified: bool, log: Option<&Path>) -> Result<Self, ClearanceError> {
+        let cleared = check(&scenario, None, uncertified, log)?;
+        Ok(Admitted { scenario, cleared, changed: false })
+    }
+
+    /// A scenario in single precision, in which boards calculate.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn in_single_precision(
+        scenario: Scenario,
+        uncertified: bool,
+        log: Option<&Path>,
+    ) -> Result<Self, ClearanceError> {
+        let single = from_scenario::in_single_precision(&scenario)?;
+        let changed = single.is_some();
+        Ok(Admitted { changed, ..Admitted::new(single.unwrap_or(scenario), uncertified, log)? })
+    }
+
+    /// The scenario.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// What is known of it.
+    #[must_use]
+    pub fn cleared(&self) -> &Cleared {
+        &self.cleared
+    }
+
+    /// The change made in it for the board's sake.
+    #[must_use]
+    pub fn note(&self) -> Option<&'static str> {
+        self.changed.then_some(from_scenario::SINGLE_PRECISION)
     }
 }
 

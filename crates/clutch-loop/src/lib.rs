@@ -16,7 +16,7 @@
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `onlooker`, `live_gains`, `tuning` | one that looks on while a run goes; gains that are changed meanwhile |
-//! | `virtual_time` | the same run with a computed clock |
+//! | `virtual_time`, `true_motion` | the same run with a computed clock; figures of the shaft's true motion in it |
 //! | `sim_board`, `sim_board_server`, `sim_board_greeting` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
 //! | `healthy` | runs in which nothing breaks |
@@ -73,6 +73,7 @@ pub mod station;
 #[cfg(target_os = "linux")]
 pub mod summary;
 pub mod to_log;
+mod true_motion;
 #[cfg(target_os = "linux")]
 mod tuning;
 pub mod virtual_time;

@@ -1,7 +1,7 @@
 //! A session with a board controller in lockstep: the board's own image, and the simulated rig as its encoder and
 //! converter, in virtual time.
 
-use crate::clearance::{Cleared, check};
+use crate::clearance::{Admitted, Cleared};
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
@@ -90,10 +90,8 @@ pub enum LockstepError {
 /// A checked session in lockstep, in single precision as the board calculates.
 #[derive(Clone, Debug)]
 pub struct LockstepSession {
-    scenario: Scenario,
+    admitted: Admitted,
     options: LockstepOptions,
-    cleared: Cleared,
-    changed: bool,
     looking: Option<Looking>,
 }
 
@@ -101,13 +99,10 @@ impl LockstepSession {
     /// Checks everything that can be checked without a board.
     ///
     /// # Errors
-    /// As [`check`].
+    /// As [`check`](crate::clearance::check).
     pub fn new(scenario: Scenario, options: LockstepOptions) -> Result<Self, SessionError> {
-        let single = from_scenario::in_single_precision(&scenario)?;
-        let changed = single.is_some();
-        let scenario = single.unwrap_or(scenario);
-        let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
-        Ok(LockstepSession { scenario, options, cleared, changed, looking: None })
+        let admitted = Admitted::in_single_precision(scenario, options.uncertified, options.log.as_deref())?;
+        Ok(LockstepSession { admitted, options, looking: None })
     }
 
     /// The same with one that looks on.
@@ -118,14 +113,8 @@ impl LockstepSession {
 
     /// The scenario as it will run.
     #[must_use]
-    pub fn scenario(&self) -> &Scenario {
-        &self.scenario
-    }
-
-    /// The change made in the scenario for the board's sake.
-    #[must_use]
-    pub fn note(&self) -> Option<&'static str> {
-        self.changed.then_some(from_scenario::SINGLE_PRECISION)
+    pub fn admitted(&self) -> &Admitted {
+        &self.admitted
     }
 
     /// Starts a board, and runs it to the path's end or to a fault.
@@ -136,7 +125,7 @@ impl LockstepSession {
         &self,
         start: impl FnOnce() -> Result<L, QemuError>,
     ) -> Result<VirtualReport, LockstepError> {
-        let (scenario, o) = (&self.scenario, &self.options);
+        let (scenario, o) = (self.admitted.scenario(), &self.options);
         let mut built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
         if let Some(silence) = o.silence {
             built.controller.silence = silence;
@@ -159,7 +148,12 @@ impl LockstepSession {
         let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
         let played = o.played(self.looking.as_ref(), scenario, &built.servo, "emulated board");
         let report = on_rig?.played(played).run(&path)?;
-        self.options.write_log(scenario, &built.servo, ("emulated board", &self.cleared), &report)?;
+        self.options.write_log(
+            scenario,
+            &built.servo,
+            ("emulated board", self.admitted.cleared()),
+            &report,
+        )?;
         Ok(report)
     }
 }

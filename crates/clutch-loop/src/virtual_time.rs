@@ -12,12 +12,12 @@ use crate::onlooker::Played;
 use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
+use crate::true_motion::{At, TrueMotion};
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{DacCode, Micros, Planned, Real};
+use clutch_core::{DacCode, FixedCounts, Micros, Planned, Real};
 use clutch_log::{CommandRecord, Record, SampleRecord};
 use clutch_node::{Ending, Notice, Outbox, Standing};
-use clutch_sim::engine::{Event, Motion, Shaft};
-use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_sim::engine::Event;
 use clutch_sim::{Metrics, MovingRig, Scenario};
 use clutch_wire::{BoardState, Refused, StopReason};
 
@@ -158,9 +158,7 @@ pub enum VirtualError {
 
 /// A sample of the shaft that waits for its answer.
 struct Sampled {
-    shaft: Shaft,
-    /// Its time by the rig's clock, s.
-    rig_time: f64,
+    at: At,
     /// The run's tick, once the controller has reported it.
     tick: Option<u64>,
 }
@@ -334,8 +332,7 @@ struct Course<'a, S: Station, B, P> {
     on: &'a mut VirtualLoop<S, B>,
     path: &'a P,
     report: VirtualReport,
-    figures: MetricsBuilder,
-    period: f64,
+    figures: TrueMotion,
     period_ns: u64,
     /// Frames of the station.
     out: Outbox,
@@ -369,8 +366,7 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
                 present: present.0,
                 ..VirtualReport::default()
             },
-            figures: MetricsBuilder::new(period.seconds(), on.params.settle),
-            period: period.seconds(),
+            figures: TrueMotion::new(period, on.station.encoder().radians_per_count(), on.params.settle),
             period_ns: u64::from(period.0) * 1000,
             out: Outbox::default(),
             up: Outbox::default(),
@@ -457,25 +453,19 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         if ignored && self.first_sample.is_some() && self.safe_at.is_none() {
             self.report.unanswered += 1;
         }
-        if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = self.waiting.take()
+        if let Some(Sampled { at, tick: Some(tick) }) = self.waiting.take()
             && tick + 1 < self.on.params.ticks
         {
-            let time = tick as f64 * self.period;
-            let error = self.target(tick) - shaft.position;
-            let voltage = self.on.board.volts();
-            self.figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage });
-            // The rig's clock began before the run's.
-            let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
-            let events: Vec<Event> = events.iter().map(of_run).collect();
-            self.figures.period(time, shaft.motion == Motion::Stuck, &events);
+            let target = self.target(tick);
+            self.figures.period(tick, &at, target, self.on.board.volts(), &events);
         }
-        let rig = self.on.board.rig();
-        let (shaft, rig_time) = (*rig.shaft(), rig.time());
-        self.waiting = Some(Sampled { shaft, rig_time, tick: None });
+        let at = At::now(self.on.board.rig());
+        let shaft = at.shaft;
+        self.waiting = Some(Sampled { at, tick: None });
         if let Some(first) = self.first_sample
             && self.safe_at.is_none()
         {
-            let error = self.target(self.sampled - first) - shaft.position;
+            let error = self.figures.angle(self.target(self.sampled - first)) - shaft.position;
             self.report.largest_error = self.report.largest_error.max(error.abs());
             self.report.errors.push(error);
         }
@@ -616,13 +606,11 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
 
     /// The path's position at a time, rad.
     fn path_at(&self, at_ns: u64) -> f64 {
-        self.target(at_ns.saturating_sub(self.origin_ns) / self.period_ns)
+        self.figures.angle(self.target(at_ns.saturating_sub(self.origin_ns) / self.period_ns))
     }
 
-    /// The path's position at a tick, rad.
-    fn target(&self, tick: u64) -> f64 {
-        let radians = self.on.station.encoder().radians_per_count::<f64>();
-        let position = self.path.target(tick).position.plus(self.on.station.origin());
-        position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
+    /// The path's position at a tick.
+    fn target(&self, tick: u64) -> FixedCounts {
+        self.path.target(tick).position.plus(self.on.station.origin())
     }
 }

@@ -29,7 +29,7 @@ use clutch_core::{
     BeginningAt, Bounds, Counts, DacCode, FixedCounts, Micros, ParamError, Planned, Real, SafeRun, Servo,
     ServoParams, Supervisor, SupervisorParams, SupervisorState,
 };
-use clutch_wire::{BoardFault, ResetCause, WATCHDOG_PERIODS};
+use clutch_wire::{BoardFault, ResetCause};
 
 /// Time for which the button has to be let go before a press counts: before consent, and before the end of a run, µs.
 const LET_GO_US: u32 = 20_000;
@@ -92,7 +92,6 @@ fn fits(servo: &ServoParams<f32>, watchdog: Micros, board: &BoardParams) -> Resu
     // To the nearest mV, as a host compares them.
     let same = |volts: f32, mv: i32| (volts * 1000.0 - f32::from_i32(mv)).abs() < 0.5;
     let (dac, period) = (&servo.dac, servo.period);
-    let longest = period.0.saturating_mul(WATCHDOG_PERIODS).min(board.watchdog_max_us);
     if servo.encoder.counts_per_rev() != board.counts_per_rev {
         Err(AloneMisfit::Encoder(board.counts_per_rev))
     } else if dac.bits != board.dac_bits
@@ -100,9 +99,9 @@ fn fits(servo: &ServoParams<f32>, watchdog: Micros, board: &BoardParams) -> Resu
         || !same(dac.highest, board.dac_highest_mv)
     {
         Err(AloneMisfit::Converter)
-    } else if !(board.period_min_us..=board.period_max_us).contains(&period.0) {
+    } else if !board.has_period(period.0) {
         Err(AloneMisfit::Period(period))
-    } else if watchdog.0 / 2 < period.0 || watchdog.0 > longest {
+    } else if !board.has_watchdog(watchdog.0, period.0) {
         Err(AloneMisfit::Watchdog(watchdog))
     } else {
         Ok(())

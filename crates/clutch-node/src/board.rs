@@ -90,6 +90,17 @@ impl BoardParams {
         })
     }
 
+    /// True if the board can sample so often, µs.
+    pub(crate) fn has_period(&self, period_us: u32) -> bool {
+        (self.period_min_us..=self.period_max_us).contains(&period_us)
+    }
+
+    /// True if its watchdog can be set to so much, µs, with a period: two of them at least, a hundred at most.
+    pub(crate) fn has_watchdog(&self, watchdog_us: u32, period_us: u32) -> bool {
+        let longest = period_us.saturating_mul(WATCHDOG_PERIODS).min(self.watchdog_max_us);
+        watchdog_us / 2 >= period_us && watchdog_us <= longest
+    }
+
     /// The converter's highest code.
     const fn top(&self) -> u16 {
         let bits = if self.dac_bits < 16 { self.dac_bits } else { 16 };
@@ -410,11 +421,9 @@ impl BoardNode {
             Some((Refusal::State, self.state as u32))
         } else if spent {
             Some((Refusal::Run, u32::from(self.run)))
-        } else if m.period_us < p.period_min_us || m.period_us > p.period_max_us {
+        } else if !p.has_period(m.period_us) {
             Some((Refusal::Period, m.period_us))
-        } else if m.watchdog_us / 2 < m.period_us
-            || m.watchdog_us > m.period_us.saturating_mul(WATCHDOG_PERIODS).min(p.watchdog_max_us)
-        {
+        } else if !p.has_watchdog(m.watchdog_us, m.period_us) {
             Some((Refusal::Watchdog, m.watchdog_us))
         } else if safe_kind.is_none() || !codes_fit || never_arrives {
             Some((Refusal::Safe, u32::from(m.safe_kind)))

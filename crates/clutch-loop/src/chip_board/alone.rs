@@ -1,11 +1,12 @@
 //! A session with an image that has no host: its button is pressed, its lamp watched, and each of its codes compared with
 //! that of the scenario's controller in this process, on the same counts.
 
-use super::{ChipBoard, ChipFault, Counted};
-use crate::clearance::check;
+use super::{ChipBoard, ChipEnd, ChipFault};
+use crate::clearance::Admitted;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::LockstepError;
 use crate::session::SessionError;
+use crate::true_motion::{At, TrueMotion};
 use crate::virtual_time::{VirtualBoard, VirtualError};
 use clutch_core::law::LawState;
 use clutch_core::supervisor::{BoardMode, Cause, Sample};
@@ -13,8 +14,6 @@ use clutch_core::{
     BeginningAt, Counts, DacCode, FixedCounts, Micros, Planned, Servo, Supervisor, SupervisorState,
 };
 use clutch_node::Outbox;
-use clutch_sim::engine::{Event, Motion};
-use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_sim::{Metrics, Scenario};
 use std::path::{Path, PathBuf};
 
@@ -43,16 +42,8 @@ pub struct AloneReport {
     /// Flashes of the lamp after the end: one for the end of the path, the number of the cause for a fault, 12 after a reset by
     /// the board itself; none if the board does not flash.
     pub flashes: u32,
-    /// The code that the converter has at the end.
-    pub last_code: u16,
-    /// Resets of the chip since power-up.
-    pub resets: u32,
-    /// True if the chip's core spins, has no clock or has locked up at the end.
-    pub dead: bool,
-    /// True if the wiring alone decides the output at the end.
-    pub floating: bool,
-    /// Numbers of instructions, if they were asked for.
-    pub counted: Option<Counted>,
+    /// The chip at the end.
+    pub chip: ChipEnd,
 }
 
 impl AloneReport {
@@ -65,7 +56,7 @@ impl AloneReport {
     /// True if the path was followed to its end, and nothing was reset on the way.
     #[must_use]
     pub fn done(&self) -> bool {
-        self.resets == 0 && self.flashes == 1 && self.codes.len() as u64 == self.ticks
+        self.chip.resets == 0 && self.flashes == 1 && self.codes.len() as u64 == self.ticks
     }
 
     /// The cause of a fault, by the lamp; none at the end of the path.
@@ -79,10 +70,9 @@ impl AloneReport {
 /// A checked session with an image that has no host.
 #[derive(Clone, Debug)]
 pub struct AloneSession {
-    scenario: Scenario,
+    admitted: Admitted,
     faults: Vec<ChipFault>,
     count: Option<PathBuf>,
-    changed: bool,
 }
 
 /// The scenario's controller, which sees what the chip sees.
@@ -100,11 +90,7 @@ impl Twin {
             time: Micros((now_ns / 1000) as u32),
             counts,
             board: BoardMode::Driving,
-            encoder_fault: false,
-            converter_fault: false,
-            command_late: false,
-            superseded: false,
-            lateness: Micros(0),
+            ..Sample::default()
         };
         self.sequence = self.sequence.wrapping_add(1);
         self.supervisor.sample(&self.servo, &mut self.state, &sample, planned);
@@ -119,43 +105,32 @@ struct Course<'a, P> {
     path: &'a P,
     twin: Twin,
     expected: Vec<u16>,
-    period: f64,
-    radians_per_count: f64,
     origin: FixedCounts,
-    figures: MetricsBuilder,
+    figures: TrueMotion,
     codes: Vec<u16>,
-    /// Error, velocity, time by the rig's clock and motion at the last sample.
-    waiting: Option<(f64, f64, f64, Motion)>,
+    /// The shaft at the last sample.
+    waiting: Option<At>,
 }
 
 impl AloneSession {
     /// Checks everything that can be checked without the image.
     ///
     /// # Errors
-    /// As [`check`].
+    /// As [`check`](crate::clearance::check).
     pub fn new(
         scenario: Scenario,
         uncertified: bool,
         faults: Vec<ChipFault>,
         count: Option<PathBuf>,
     ) -> Result<Self, SessionError> {
-        let single = from_scenario::in_single_precision(&scenario)?;
-        let changed = single.is_some();
-        let scenario = single.unwrap_or(scenario);
-        check(&scenario, None, uncertified, None)?;
-        Ok(AloneSession { scenario, faults, count, changed })
+        let admitted = Admitted::in_single_precision(scenario, uncertified, None)?;
+        Ok(AloneSession { admitted, faults, count })
     }
 
     /// The scenario as it will run.
     #[must_use]
-    pub fn scenario(&self) -> &Scenario {
-        &self.scenario
-    }
-
-    /// The change made in the scenario for the board's sake.
-    #[must_use]
-    pub fn note(&self) -> Option<&'static str> {
-        self.changed.then_some(from_scenario::SINGLE_PRECISION)
+    pub fn admitted(&self) -> &Admitted {
+        &self.admitted
     }
 
     /// Powers up a board with an image, presses its button, and lets it run to the path's end or to a fault.
@@ -163,13 +138,13 @@ impl AloneSession {
     /// # Errors
     /// The chip does not start or ends; no press begins a run.
     pub fn run(&self, image: &Path) -> Result<AloneReport, LockstepError> {
-        let scenario = &self.scenario;
+        let scenario = self.admitted.scenario();
         let spec = scenario.spec();
         let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
         let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
-        let period = spec.period.seconds();
         let board = ChipBoard::start(image, scenario, &self.faults, self.count.as_deref())?;
         let radians_per_count = board.rig().rig().encoder.radians_per_count();
+        let figures = TrueMotion::new(spec.period, radians_per_count, spec.run.settle);
         let twin = Twin {
             servo: built.servo,
             supervisor: built.supervisor,
@@ -182,10 +157,8 @@ impl AloneSession {
             path: &path,
             twin,
             expected: Vec::new(),
-            period,
-            radians_per_count,
             origin: FixedCounts(0),
-            figures: MetricsBuilder::new(period, spec.run.settle),
+            figures,
             codes: Vec::new(),
             waiting: None,
         };
@@ -194,8 +167,6 @@ impl AloneSession {
         let goes_on = course.board.lamp();
         let flashes = course.flashes()?;
         let Course { board, figures, codes, expected, .. } = course;
-        let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
-        let last_code = board.code().0;
         Ok(AloneReport {
             codes,
             expected,
@@ -203,11 +174,7 @@ impl AloneSession {
             goes_on,
             metrics: figures.finish(),
             flashes,
-            last_code,
-            resets,
-            dead,
-            floating,
-            counted: board.end().map_err(VirtualError::from)?,
+            chip: board.end().map_err(VirtualError::from)?,
         })
     }
 
@@ -269,10 +236,7 @@ impl<P: Planned<f32>> Course<'_, P> {
     /// A sample has its code.
     fn sampled(&mut self) {
         let rig = self.board.rig();
-        let target = self.path.target(self.codes.len() as u64).position.plus(self.origin);
-        let target = target.minus::<f64>(FixedCounts(0)) * self.radians_per_count;
-        let shaft = rig.shaft();
-        self.waiting = Some((target - shaft.position, shaft.velocity, rig.time(), shaft.motion));
+        self.waiting = Some(At::now(rig));
         let planned = BeginningAt { planned: self.path, origin: self.origin };
         self.expected.push(self.twin.code(self.now_ns, rig.counts(), planned));
         self.codes.push(self.board.code().0);
@@ -281,12 +245,10 @@ impl<P: Planned<f32>> Course<'_, P> {
     /// The period behind the last sample is over.
     fn measure(&mut self) {
         let events = self.board.take_events();
-        let Some((error, velocity, rig_time, motion)) = self.waiting.take() else { return };
-        let time = (self.codes.len() - 1) as f64 * self.period;
-        self.figures.sample(time, MetricsSample { error, velocity, voltage: self.board.volts() });
-        let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
-        let events: Vec<Event> = events.iter().map(of_run).collect();
-        self.figures.period(time, motion == Motion::Stuck, &events);
+        let Some(began) = self.waiting.take() else { return };
+        let tick = self.codes.len() as u64 - 1;
+        let target = self.path.target(tick).position.plus(self.origin);
+        self.figures.period(tick, &began, target, self.board.volts(), &events);
     }
 
     /// The flashes of the lamp until it pauses; none while it is lit because control has not ended.

@@ -62,6 +62,21 @@ pub struct ChipBoard {
     button: Option<bool>,
 }
 
+/// A chip at the end of a session.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct ChipEnd {
+    /// Resets since power-up.
+    pub resets: u32,
+    /// True if its core spins, has no clock or has locked up.
+    pub dead: bool,
+    /// True if the wiring alone decides the output.
+    pub floating: bool,
+    /// The code that its converter has.
+    pub code: u16,
+    /// Numbers of instructions, if they were asked for.
+    pub counted: Option<Counted>,
+}
+
 /// A bit beside those of the faults: the board's button is pressed, `Fault.PRESSED` in the model.
 const PRESSED: u32 = 1 << 30;
 
@@ -184,12 +199,13 @@ impl ChipBoard {
         }
     }
 
-    /// Ends the chip: the numbers of instructions, if they were counted.
+    /// Ends the chip: how it was then.
     ///
     /// # Errors
-    /// They cannot be read.
-    pub fn end(self) -> Result<Option<Counted>, ChipError> {
-        self.chip.end()
+    /// The numbers of instructions cannot be read.
+    pub fn end(self) -> Result<ChipEnd, ChipError> {
+        let (resets, dead, floating) = (self.resets(), self.dead(), self.floating());
+        Ok(ChipEnd { resets, dead, floating, code: self.last.code, counted: self.chip.end()? })
     }
 
     /// The faults that are in force, as the chip takes them.

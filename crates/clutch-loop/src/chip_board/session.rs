@@ -1,7 +1,7 @@
 //! A session with a board whose image runs on the model of its chip, in virtual time.
 
-use super::{ChipBoard, ChipFault, ChipKind, Counted};
-use crate::clearance::{Cleared, check};
+use super::{ChipBoard, ChipEnd, ChipFault, ChipKind};
+use crate::clearance::Admitted;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
 use crate::onlooker::Looking;
@@ -50,25 +50,17 @@ pub struct ChipOptions {
 pub struct ChipReport {
     /// The run.
     pub ran: VirtualReport,
-    /// Resets of the chip since power-up.
-    pub resets: u32,
-    /// True if the chip's core spins, has no clock or has locked up at the end.
-    pub dead: bool,
-    /// True if the wiring alone decides the output at the end.
-    pub floating: bool,
-    /// Numbers of instructions, if they were asked for.
-    pub counted: Option<Counted>,
+    /// The chip at the end.
+    pub chip: ChipEnd,
 }
 
 /// A checked session with the chip.
 #[derive(Clone, Debug)]
 pub struct ChipSession {
-    scenario: Scenario,
+    admitted: Admitted,
     options: LockstepOptions,
     chip: ChipOptions,
     role: ChipRole,
-    cleared: Cleared,
-    changed: bool,
     looking: Option<Looking>,
 }
 
@@ -76,21 +68,19 @@ impl ChipSession {
     /// Checks everything that can be checked without a board.
     ///
     /// # Errors
-    /// As [`check`].
+    /// As [`check`](crate::clearance::check).
     pub fn new(
         scenario: Scenario,
         options: LockstepOptions,
         chip: ChipOptions,
         role: ChipRole,
     ) -> Result<Self, SessionError> {
-        let single = match role {
-            ChipRole::Controller => from_scenario::in_single_precision(&scenario)?,
-            ChipRole::Daq => None,
+        let (uncertified, log) = (options.uncertified, options.log.as_deref());
+        let admitted = match role {
+            ChipRole::Controller => Admitted::in_single_precision(scenario, uncertified, log)?,
+            ChipRole::Daq => Admitted::new(scenario, uncertified, log)?,
         };
-        let changed = single.is_some();
-        let scenario = single.unwrap_or(scenario);
-        let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
-        Ok(ChipSession { scenario, options, chip, role, cleared, changed, looking: None })
+        Ok(ChipSession { admitted, options, chip, role, looking: None })
     }
 
     /// The same with one that looks on.
@@ -101,14 +91,8 @@ impl ChipSession {
 
     /// The scenario as it will run.
     #[must_use]
-    pub fn scenario(&self) -> &Scenario {
-        &self.scenario
-    }
-
-    /// The change made in the scenario for the board's sake.
-    #[must_use]
-    pub fn note(&self) -> Option<&'static str> {
-        self.changed.then_some(from_scenario::SINGLE_PRECISION)
+    pub fn admitted(&self) -> &Admitted {
+        &self.admitted
     }
 
     /// Powers up a board with an image, and runs it to the path's end or to a fault.
@@ -117,9 +101,7 @@ impl ChipSession {
     /// The chip does not start or ends; the board does not take the run; the log cannot be written.
     pub fn run(&self, image: &Path) -> Result<ChipReport, LockstepError> {
         let (ran, board) = self.run_board(image)?;
-        let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
-        let counted = board.end().map_err(VirtualError::from)?;
-        Ok(ChipReport { ran, resets, dead, floating, counted })
+        Ok(ChipReport { ran, chip: board.end().map_err(VirtualError::from)? })
     }
 
     /// The same; gives the board as the run has left it.
@@ -127,7 +109,7 @@ impl ChipSession {
     /// # Errors
     /// As [`ChipSession::run`].
     pub fn run_board(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
-        match (self.role, self.scenario.scalar()) {
+        match (self.role, self.admitted.scenario().scalar()) {
             (ChipRole::Controller, _) => self.controller(image),
             (ChipRole::Daq, ScalarKind::F32) => self.daq::<f32>(image),
             (ChipRole::Daq, ScalarKind::F64) => self.daq::<f64>(image),
@@ -136,7 +118,7 @@ impl ChipSession {
 
     /// The loop is closed on the chip.
     fn controller(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
-        let scenario = &self.scenario;
+        let scenario = self.admitted.scenario();
         let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
         // The last period is the one in which the run ends.
         let ticks = built.ticks + 1;
@@ -151,8 +133,8 @@ impl ChipSession {
 
     /// The loop is closed here.
     fn daq<T: Real>(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
-        let built = BuiltRun::<T>::new(&self.scenario, 1).map_err(SessionError::from)?;
-        let path = from_scenario::path::<T>(&self.scenario).map_err(SessionError::from)?;
+        let built = BuiltRun::<T>::new(self.admitted.scenario(), 1).map_err(SessionError::from)?;
+        let path = from_scenario::path::<T>(self.admitted.scenario()).map_err(SessionError::from)?;
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
         let station = ControllerStation { node, path: &path };
         self.drive(image, &built, built.ticks + 1, station, &path)
@@ -166,7 +148,7 @@ impl ChipSession {
         station: S,
         path: &impl Planned<S::Scalar>,
     ) -> Result<(VirtualReport, ChipBoard), LockstepError> {
-        let (run, o) = (&self.scenario.spec().run, &self.options);
+        let (run, o) = (&self.admitted.scenario().spec().run, &self.options);
         // A host hears only after a while that a board is silent.
         let broken = !o.faults.is_empty() || !self.chip.faults.is_empty();
         let after = if broken { 0.1 + BOARD_SILENCE_NS as f64 / 1e9 } else { 0.1 };
@@ -180,13 +162,14 @@ impl ChipSession {
             settle: run.settle,
             ..VirtualOptions::default()
         };
-        let board = ChipBoard::start(image, &self.scenario, &self.chip.faults, self.chip.count.as_deref());
+        let board =
+            ChipBoard::start(image, self.admitted.scenario(), &self.chip.faults, self.chip.count.as_deref());
         let chip =
             ChipKind::of(image).map_or_else(String::new, |kind| format!("model of an {}", kind.name()));
-        let played = o.played(self.looking.as_ref(), &self.scenario, &built.servo, &chip);
+        let played = o.played(self.looking.as_ref(), self.admitted.scenario(), &built.servo, &chip);
         let mut on_chip = VirtualLoop::with_board(board?, params, station).played(played);
         let ran = on_chip.run(path)?;
-        o.write_log(&self.scenario, &built.servo, (&chip, &self.cleared), &ran)?;
+        o.write_log(self.admitted.scenario(), &built.servo, (&chip, self.admitted.cleared()), &ran)?;
         Ok((ran, on_chip.into_board()))
     }
 }

@@ -1,6 +1,7 @@
 //! A controller without a host: consent by a button, its end, faults; codes are those of any other supervisor's.
 
 use crate::desk::{BOARD, PATHS, Plan};
+use crate::hardware::{Desk, Done};
 use clutch_core::law::{Pd, PdParams};
 use clutch_core::reference::{Interpolation, Knot, OneKind, Ramp, Reference, ReferenceParams, Table};
 use clutch_core::supervisor::{BoardMode, Cause, Sample, State};
@@ -8,53 +9,10 @@ use clutch_core::{
     BeginningAt, Counts, DacCode, Encoder, FixedCounts, Micros, ParamError, Planned, SafeState, Servo,
     SupervisorState, Target,
 };
-use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, Hardware, ResetCause};
+use clutch_node::{Alone, AloneMisfit, AloneRun, BoardParams, ResetCause};
+use core::mem::take;
 
 const BOOT_CODE: u16 = BOARD.boot_code;
-
-/// A board in whose hands a shaft does what a test says.
-#[derive(Default)]
-struct Desk {
-    now_us: u64,
-    counts: i32,
-    encoder_fault: bool,
-    code: u16,
-    fed: u32,
-    /// Time that a sample needs up to its code, µs.
-    slow_us: u64,
-    /// A code is out that the watchdog has not been fed for.
-    put_out: bool,
-}
-
-impl Hardware for Desk {
-    fn now_us(&self) -> u64 {
-        self.now_us
-    }
-    fn counts(&mut self) -> Counts {
-        Counts(self.counts)
-    }
-    fn encoder_fault(&self) -> bool {
-        self.encoder_fault
-    }
-    fn converter_fault(&self) -> bool {
-        false
-    }
-    fn put_out(&mut self, code: DacCode) {
-        self.code = code.0;
-        self.now_us += self.slow_us;
-        self.put_out = true;
-    }
-    fn feed_watchdog(&mut self) {
-        assert!(core::mem::take(&mut self.put_out), "fed without a code");
-        self.fed += 1;
-    }
-    fn send(&mut self, _frames: &[u8]) -> bool {
-        panic!("a controller without a host sends nothing")
-    }
-    fn cycles(&self) -> u32 {
-        0
-    }
-}
 
 type OnRamp = Alone<Pd<f32>, Ramp<f32>>;
 
@@ -80,6 +38,8 @@ struct Bench {
     alone: OnRamp,
     desk: Desk,
     pressed: bool,
+    /// The code that is out.
+    code: u16,
     /// Periods in which the shaft has moved.
     moved: usize,
 }
@@ -91,7 +51,7 @@ impl Bench {
 
     fn on(plan: &Plan, board: &BoardParams) -> Bench {
         let alone = Alone::new(&run(plan), board).unwrap();
-        Bench { alone, desk: Desk { counts: 70, ..Desk::default() }, pressed: false, moved: 0 }
+        Bench { alone, desk: Desk { counts: 70, ..Desk::default() }, pressed: false, code: 0, moved: 0 }
     }
 
     /// A run that has gone on for some periods, with the button let go.
@@ -114,12 +74,15 @@ impl Bench {
                 self.desk.counts += STEPS[self.moved % STEPS.len()];
                 self.moved += 1;
             }
-            self.desk.now_us += u64::from(self.alone.period_us()) - self.desk.slow_us;
-            let fed = self.desk.fed;
+            self.desk.now_us += u64::from(self.alone.period_us() - self.desk.takes_us);
             self.alone.tick(&mut self.desk, self.pressed);
-            assert_eq!(self.desk.fed, fed + 1, "the watchdog is fed once");
+            // One code, and only then the watchdog.
+            match take(&mut self.desk.done)[..] {
+                [Done::Sampled, Done::PutOut(code), Done::FedWatchdog] => self.code = code,
+                ref done => panic!("{done:?}"),
+            }
         }
-        self.desk.code
+        self.code
     }
 
     /// A press of some periods, and the button let go for long.
@@ -151,7 +114,7 @@ fn nothing_but_a_press_after_the_button_was_let_go_begins_a_run() {
         bench.pressed = false;
         bench.pass(1);
     }
-    assert_eq!((bench.state(), bench.desk.code), ((State::Ready, Cause::None), BOOT_CODE));
+    assert_eq!((bench.state(), bench.code), ((State::Ready, Cause::None), BOOT_CODE));
     // The twentieth period of a press; the sample of that very period is the first that is answered.
     bench.pass(20);
     bench.pressed = true;
@@ -189,11 +152,7 @@ fn its_codes_are_those_of_a_supervisor_with_the_law_of_the_list() {
                 time: Micros(bench.desk.now_us as u32),
                 counts,
                 board: BoardMode::Driving,
-                encoder_fault: false,
-                converter_fault: false,
-                command_late: false,
-                superseded: false,
-                lateness: Micros(0),
+                ..Sample::default()
             };
             let origin = FixedCounts::from_counts(if tick == 0 { i64::from(counts.0) } else { 70 });
             let planned = BeginningAt { planned: &path, origin };
@@ -201,13 +160,13 @@ fn its_codes_are_those_of_a_supervisor_with_the_law_of_the_list() {
             let answer = cycle.answer.unwrap_or_else(|| panic!("tick {tick}: {cycle:?}")).0;
             codes.insert(answer);
             if tick < 299 {
-                assert_eq!(bench.desk.code, answer, "tick {tick} from {start}");
+                assert_eq!(bench.code, answer, "tick {tick} from {start}");
             }
         }
         assert!(codes.len() > 20, "{} codes", codes.len());
         // After the last tick the safe output holds.
         assert_eq!(bench.state(), (State::Holding, Cause::Done));
-        assert_eq!(bench.desk.code, supervisor.safe_codes().hold.0);
+        assert_eq!(bench.code, supervisor.safe_codes().hold.0);
     }
 }
 
@@ -226,7 +185,7 @@ fn a_press_ends_a_run_at_once_and_a_long_and_a_short_one_begin_another() {
     bench.press(999);
     assert_eq!(bench.state().0, State::Holding);
     bench.press(1000);
-    assert_eq!((bench.state().0, bench.desk.code), (State::Ready, hold));
+    assert_eq!((bench.state().0, bench.code), (State::Ready, hold));
     // From where the shaft is by now.
     bench.pass(1000);
     let here = i64::from(bench.desk.counts);
@@ -354,7 +313,7 @@ fn a_safe_state_goes_on_through_an_acknowledgement() {
         plan.limits.on_fault = on_fault;
         let mut bench = Bench::running(&plan);
         let volts = |code: u16| f32::from(code) * 20.0 / 4096.0 - 10.0;
-        let begin = volts(bench.desk.code);
+        let begin = volts(bench.code);
         bench.pressed = true;
         let first = volts(bench.pass(1));
         // One step, not two: 0.2 mV of a ramp, or the voltage that holds.
@@ -364,7 +323,7 @@ fn a_safe_state_goes_on_through_an_acknowledgement() {
         bench.pass(30);
         bench.press(1000);
         assert_eq!(bench.state().0, State::Ready, "{on_fault:?}");
-        assert!((volts(bench.desk.code) - ends_at).abs() > 1.0, "{on_fault:?}: it is still on its way");
+        assert!((volts(bench.code) - ends_at).abs() > 1.0, "{on_fault:?}: it is still on its way");
         let end = volts(bench.pass(40_000));
         assert!((end - ends_at).abs() < 0.006, "{on_fault:?}: {end} V");
         assert_eq!(bench.state().0, State::Ready, "{on_fault:?}");
@@ -377,7 +336,7 @@ fn a_law_that_gives_no_codes_is_ended_by_the_watchdog() {
     // A count that no shaft can have does not end control, and is not answered.
     plan.limits.limits.jumps = 128;
     let mut bench = Bench::running(&plan);
-    let before = bench.desk.code;
+    let before = bench.code;
     for _ in 0..2 {
         bench.desk.counts += 5000;
         assert_eq!(bench.pass(1), before, "the code stays");
@@ -392,10 +351,10 @@ fn a_law_that_gives_no_codes_is_ended_by_the_watchdog() {
 fn answers_that_are_too_late_end_a_run() {
     let plan = Plan::new();
     let mut bench = Bench::running(&plan);
-    bench.desk.slow_us = u64::from(plan.limits.limits.deadline.0);
+    bench.desk.takes_us = plan.limits.limits.deadline.0;
     bench.pass(40);
     assert_eq!(bench.state().0, State::Running);
-    bench.desk.slow_us += 1;
+    bench.desk.takes_us += 1;
     bench.pass(40);
     assert_eq!(bench.state(), (State::Faulted, Cause::Deadline));
 }

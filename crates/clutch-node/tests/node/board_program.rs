@@ -1,8 +1,9 @@
 //! The work of a board's program in each period and with each byte, and a counter of 16 bits.
 
+use crate::hardware::{Desk, Done};
 use clutch_core::{Counts, DacCode, Micros};
-use clutch_node::{BoardParams, DaqBoard, Hardware, Outbox, Role, WideCounter, receive, tick};
-use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, ResetCause, SafeKind, Sample, encode};
+use clutch_node::{BoardParams, DaqBoard, Outbox, Role, WideCounter, receive, tick};
+use clutch_wire::{Actuate, Arm, Configure, Message, ResetCause, SafeKind, Sample, encode};
 use core::mem::take;
 use proptest::prelude::*;
 
@@ -32,62 +33,6 @@ const CONFIGURE: Configure = Configure {
     ramp_step: 0,
     hold_periods: 0,
 };
-
-/// Actions on the hardware, in their order.
-#[derive(Debug, PartialEq)]
-enum Done {
-    Sampled,
-    PutOut(u16),
-    FedWatchdog,
-    Sent(Vec<Message>),
-}
-
-#[derive(Default)]
-struct Desk {
-    now_us: u64,
-    cycles: u32,
-    counts: i32,
-    encoder_fault: bool,
-    busy: bool,
-    done: Vec<Done>,
-}
-
-impl Hardware for Desk {
-    fn now_us(&self) -> u64 {
-        self.now_us
-    }
-    fn counts(&mut self) -> Counts {
-        self.done.push(Done::Sampled);
-        Counts(self.counts)
-    }
-    fn encoder_fault(&self) -> bool {
-        self.encoder_fault
-    }
-    fn converter_fault(&self) -> bool {
-        false
-    }
-    /// Takes 7 µs, 1190 cycles.
-    fn put_out(&mut self, code: DacCode) {
-        self.now_us += 7;
-        self.cycles = self.cycles.wrapping_add(1190);
-        self.done.push(Done::PutOut(code.0));
-    }
-    fn feed_watchdog(&mut self) {
-        self.done.push(Done::FedWatchdog);
-    }
-    fn send(&mut self, frames: &[u8]) -> bool {
-        if self.busy {
-            return false;
-        }
-        let mut decoder = Decoder::new();
-        self.done
-            .push(Done::Sent(frames.iter().filter_map(|b| decoder.push(*b)).map(Result::unwrap).collect()));
-        true
-    }
-    fn cycles(&self) -> u32 {
-        self.cycles
-    }
-}
 
 impl Desk {
     fn hears(&mut self, role: &mut impl Role, message: &Message) -> Vec<Done> {

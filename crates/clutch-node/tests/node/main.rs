@@ -10,6 +10,7 @@ mod board_program;
 mod controller;
 mod controller_lockstep;
 mod desk;
+mod hardware;
 mod limits;
 mod one_chip;
 mod settings;
