@@ -1,17 +1,12 @@
 //! `clutch scenario header`: a scenario's settings for libclutch.
 
-use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, paragraph, print, remark, warn};
+use crate::compiled_in::{Compiled, CompiledArgs};
+use crate::output::{BUILD, Exit, print};
 use anyhow::ensure;
 use clap::Args;
-use clutch_core::Micros;
 use clutch_core::params::Kind;
-use clutch_loop::clearance::{ClearanceError, check};
-use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_settings::{Declared, SETTINGS_HASH, Setting, Settings};
-use clutch_sim::Scenario;
+use clutch_settings::{Declared, SETTINGS_HASH, Setting};
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 /// Prints the settings of a scenario as a C header for libclutch.
 #[derive(Args)]
@@ -22,30 +17,6 @@ pub(crate) struct HeaderVerb {
     /// Begin of the names in the header.
     #[arg(long, default_value = "run")]
     name: String,
-}
-
-/// A scenario whose run a program has compiled in.
-#[derive(Args)]
-pub(crate) struct CompiledArgs {
-    #[command(flatten)]
-    scenario: ScenarioArgs,
-    /// Prints a run although its gains are not certified.
-    #[arg(long)]
-    uncertified: bool,
-    /// Certificate of the sampled loop, as `clutch certify --sampled --save` writes it: it is checked, and that it is this
-    /// scenario's.
-    #[arg(long, value_name = "FILE.json")]
-    certificate: Option<PathBuf>,
-}
-
-/// A run for a program that has it compiled in.
-pub(crate) struct Compiled {
-    /// In single precision.
-    pub(crate) scenario: Scenario,
-    pub(crate) run: BuiltRun<f32>,
-    settings: Settings,
-    /// What is known of the gains, a line each.
-    pub(crate) verdicts: Vec<String>,
 }
 
 impl HeaderVerb {
@@ -59,34 +30,6 @@ impl HeaderVerb {
         let Some(compiled) = self.run.load()? else { return Ok(Exit::NotCertified) };
         print(&header(&self.name, &compiled))?;
         Ok(Exit::Done)
-    }
-}
-
-impl CompiledArgs {
-    /// The run, such that a board takes it; none, and the reason is printed, if its gains are not certified. Limits that a
-    /// sound shaft will meet are remarked, as before a run on a board.
-    pub(crate) fn load(&self) -> anyhow::Result<Option<Compiled>> {
-        let file = self.scenario.scenario.display();
-        let scenario = self.scenario.load()?;
-        let cleared = match check(&scenario, self.certificate.as_deref(), self.uncertified, None) {
-            Ok(cleared) => cleared,
-            Err(ClearanceError::NotCertified { lack, .. }) => {
-                let refusal = format!("{}: {lack}, so nothing was printed.", scenario.name());
-                let advice =
-                    format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
-                warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
-                return Ok(None);
-            }
-            Err(refusal) => return Err(refusal.into()),
-        };
-        cleared.limits_met(&scenario).iter().for_each(|note| remark(&paragraph(note)));
-        let verdicts =
-            cleared.verdicts().iter().map(|(name, verdict)| format!("{name}: {verdict}")).collect();
-        let scenario = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
-        let run = BuiltRun::new(&scenario, 0)?;
-        // Nobody but the program itself looks on.
-        let settings = from_scenario::settings(&scenario, &run, Micros(0), run.ticks)?;
-        Ok(Some(Compiled { scenario, run, settings, verdicts }))
     }
 }
 

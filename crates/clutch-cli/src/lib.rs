@@ -8,6 +8,7 @@ pub mod certify;
 #[cfg(feature = "parquet")]
 mod columnar;
 mod compare;
+mod compiled_in;
 #[cfg(target_os = "linux")]
 mod daq;
 #[cfg(any(not(target_os = "linux"), test))]

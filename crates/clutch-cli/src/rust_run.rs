@@ -1,6 +1,6 @@
 //! `clutch scenario rust`: a scenario's run for a program in Rust.
 
-use crate::c_header::{Compiled, CompiledArgs};
+use crate::compiled_in::{Compiled, CompiledArgs};
 use crate::output::{BUILD, Exit, print};
 use clap::Args;
 use clutch_core::FixedCounts;
