@@ -26,14 +26,18 @@ class Job(ctypes.Structure):
     ]
 
 
-def widest() -> tuple[str, str] | None:
-    """The widest instructions of this processor that brute/brute.c takes, and the compiler's flag; None of others."""
+def instructions() -> list[tuple[str, str, str]]:
+    """Those of this processor that brute/brute.c takes, the widest first: their name, clutch's name of them, and the
+    compiler's flag. None on other kinds of processors."""
     try:
         flags = pathlib.Path("/proc/cpuinfo").read_text()
     except OSError:
-        return None
-    known = [("avx512dq", "AVX-512", "-march=x86-64-v4"), ("avx2", "AVX2", "-march=x86-64-v3")]
-    return next(((name, march) for feature, name, march in known if feature in flags), None)
+        return []
+    known = [
+        ("avx512dq", "AVX-512", "avx512", "-march=x86-64-v4"),
+        ("avx2", "AVX2", "avx2", "-march=x86-64-v3"),
+    ]
+    return [(name, ours, march) for feature, name, ours, march in known if feature in flags]
 
 
 @functools.cache

@@ -1,6 +1,9 @@
 """The job done by clutch: one run, and many."""
 
+import os
+
 import clutch
+from clutch import _clutch
 from job import Figures, toml
 
 METRICS = ["rms_error_rad", "max_error_rad", "stick_slip_cycles_per_s", "measured_s"]
@@ -24,3 +27,14 @@ def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
     table = clutch.sweep(job, samples, metrics=METRICS, progress=False).table
     sticks = table["stick_slip_cycles_per_s"] * table["measured_s"]
     return Figures(float(table["rms_error_rad"].mean()), float(table["max_error_rad"].mean()), float(sticks.mean()))
+
+
+def run_in(instructions: str, job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
+    """As `run_many`, in lanes of these instructions. A shaft that stops goes on alone, by the widest that there are."""
+    keys, rows = ["law.pd.kp_v_rad", "law.pd.kd_v_s_rad"], [list(pair) for pair in pairs]
+    sweep = _clutch.Sweep(job._tables(), keys, rows, METRICS, threads=os.cpu_count(), instructions=instructions)
+    sweep.start()
+    while not sweep.wait(10.0):
+        pass
+    rms, most, rate, measured = (sweep.result()[0][name] for name in METRICS)
+    return Figures(float(rms.mean()), float(most.mean()), float((rate * measured).mean()))

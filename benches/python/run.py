@@ -89,17 +89,42 @@ def many_runs(job: str, quick: bool) -> list[Row]:
     targets = {"numba": 350.0, "c": 40.0} if job == "J20" else {"numba": 25.0, "c": 4.0}
     numba = Candidate("numba RK4, 10 steps a sample, prange", lambda: numba_peer.run_many(job, n), 1)
     peers = [(numba, targets["numba"])]
-    if widest := c_peer.widest():
-        name, march = widest
-        c_peer.build(march)
-        work = functools.partial(c_peer.run_many, job, n, march)
-        peers.append((Candidate(f"C in vectors, RK4, 10 steps a sample, {name}", work, rounds), targets["c"]))
+    known = c_peer.instructions()
+    if known:
+        name, _, march = known[0]
+        peers.append((brute(job, n, name, march, rounds), targets["c"]))
     mine = Candidate("clutch.sweep", lambda: ours.run_many(scenario, pairs), rounds)
     interleave([*(c for c, _ in peers), mine])
     section = f"{n} runs, {job}"
     simulated = n * DURATION
     rows = [Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / mine.cpu, target) for c, target in peers]
-    return [*rows, Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result)]
+    rows.append(Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result))
+    for name, ours_name, march in known[1:]:
+        rows += many_runs_in(job, n, (name, ours_name, march), rounds)
+    return rows
+
+
+def brute(job: str, n: int, name: str, march: str, rounds: int) -> Candidate:
+    """C in vectors, compiled before anything is timed."""
+    c_peer.build(march)
+    work = functools.partial(c_peer.run_many, job, n, march)
+    return Candidate(f"C in vectors, RK4, 10 steps a sample, {name}", work, rounds)
+
+
+def many_runs_in(job: str, n: int, instructions: tuple[str, str, str], rounds: int) -> list[Row]:
+    """As `many_runs`, C and clutch both with instructions that are not the widest of this processor."""
+    name, ours_name, march = instructions
+    scenario, pairs = ours.scenario(job), gains(n)
+    c = brute(job, n, name, march, rounds)
+    mine = Candidate("clutch.sweep", functools.partial(ours.run_in, ours_name, scenario, pairs), rounds)
+    interleave([c, mine])
+    section = f"{n} runs, {job}, {name} only"
+    target = 40.0 if job == "J20" else 4.0
+    simulated = n * DURATION
+    return [
+        Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / mine.cpu, target),
+        Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result),
+    ]
 
 
 def scaling(section: str, cells: list[tuple[str, int, float, Candidate]], per_second: bool) -> list[Row]:

@@ -83,9 +83,11 @@ pub(crate) struct Sweep {
 
 #[pymethods]
 impl Sweep {
-    /// `rows` of values for the dotted `keys`, over the scenario's tables.
+    /// `rows` of values for the dotted `keys`, over the scenario's tables. `instructions` are those of the lanes, for
+    /// comparisons; else the widest that the processor has.
     #[new]
-    #[pyo3(signature = (tables, keys, rows, metrics, traces=Vec::new(), every=1, threads=None))]
+    #[pyo3(signature = (tables, keys, rows, metrics, traces=Vec::new(), every=1, threads=None, instructions=None))]
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         tables: &Bound<'_, PyDict>,
         keys: Vec<String>,
@@ -94,6 +96,7 @@ impl Sweep {
         traces: Vec<String>,
         every: usize,
         threads: Option<usize>,
+        instructions: Option<&str>,
     ) -> PyResult<Sweep> {
         let base = to_table(tables)?;
         let rows = rows
@@ -117,9 +120,14 @@ impl Sweep {
             return Err(PyValueError::new_err("threads = 0: expected at least 1"));
         }
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let sweep = sweep::Sweep::new("sweep", base, keys, rows);
+        let refused = |e: &dyn std::error::Error| PyValueError::new_err(e.to_string());
+        let sweep = sweep::Sweep::new("sweep", base, keys, rows).map_err(|e| refused(&e))?;
+        let sweep = match instructions {
+            Some(asked) => sweep.in_lanes_of(asked).map_err(|e| refused(&e))?,
+            None => sweep,
+        };
         Ok(Sweep {
-            sweep: Arc::new(sweep.map_err(|e| PyValueError::new_err(e.to_string()))?),
+            sweep: Arc::new(sweep),
             metrics,
             traces,
             every,

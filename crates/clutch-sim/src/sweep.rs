@@ -3,6 +3,7 @@
 //! Each row is a run of its own, with its own seed. Its result depends on nothing but the row: not on
 //! the number of threads, nor on which other rows there are.
 
+use crate::lane::vector::levels;
 use crate::lanes;
 use crate::progress::UNWATCHED;
 use crate::run::{Keep, Run};
@@ -26,8 +27,18 @@ pub struct Sweep {
     base: Table,
     keys: Vec<String>,
     rows: Vec<Vec<Value>>,
+    /// Instructions of its lanes.
+    level: Level,
     /// Made of the first row that is a scenario; none if a key changes more than a value.
     shared: OnceLock<Option<Shared>>,
+}
+
+/// Instructions that this processor does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("instructions = \"{asked}\": expected one of this processor's: {}", .known.join(", "))]
+pub struct NoInstructions {
+    asked: String,
+    known: Vec<&'static str>,
 }
 
 /// What all rows have in common.
@@ -68,8 +79,28 @@ impl Sweep {
     pub fn new(origin: &str, base: Table, keys: Vec<String>, rows: Vec<Vec<Value>>) -> Result<Sweep, Misfit> {
         match rows.iter().position(|row| row.len() != keys.len()) {
             Some(row) => Err(Misfit { row, values: rows[row].len(), keys: keys.len() }),
-            None => Ok(Sweep { origin: origin.into(), base, keys, rows, shared: OnceLock::new() }),
+            None => {
+                let (origin, level) = (origin.into(), Level::new());
+                Ok(Sweep { origin, base, keys, rows, level, shared: OnceLock::new() })
+            }
         }
+    }
+
+    /// The sweep with lanes of these instructions, `sse2`, `sse4.2`, `avx2`, `avx512` or `neon`, and not of the widest that the
+    /// processor has: for comparisons. The rows' bits are the same.
+    ///
+    /// # Errors
+    /// This processor does not have them.
+    pub fn in_lanes_of(mut self, instructions: &str) -> Result<Sweep, NoInstructions> {
+        let known = levels();
+        match known.iter().find(|(name, _)| *name == instructions) {
+            Some((_, level)) => self.level = *level,
+            None => {
+                let known = known.into_iter().map(|(name, _)| name).collect();
+                return Err(NoInstructions { asked: instructions.into(), known });
+            }
+        }
+        Ok(self)
     }
 
     /// The number of rows.
@@ -167,7 +198,7 @@ impl Sweep {
             let doubles = planned.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
             let specs = doubles.map(|(place, row)| (place, row.2.spec()));
             let goes_on =
-                lanes::run_all(Level::new(), specs, &stopped, &mut |place, engine, metrics, detected| {
+                lanes::run_all(self.level, specs, &stopped, &mut |place, engine, metrics, detected| {
                     let (i, certified, _) = &planned[place];
                     told[place] = true;
                     done(

@@ -57,7 +57,7 @@ fn play(fleet: &mut Fleet, rng: &mut Pcg64) {
 fn same_bits(scenario: &Scenario, shafts: u64, steps: usize) -> (usize, bool) {
     let seeds: Vec<u64> = (1..=shafts).collect();
     let mut went = (0, false);
-    for level in levels() {
+    for (_, level) in levels() {
         let mut alone = Fleet::by(None, scenario, &seeds).unwrap();
         let mut together = Fleet::by(Some(level), scenario, &seeds).unwrap();
         assert_eq!((alone.len(), in_lanes(&alone)), (seeds.len(), 0));
@@ -185,7 +185,7 @@ fn a_shaft_that_lanes_lose_goes_on_alone_until_it_begins_anew() {
         ("rig.viscous_damping_nm_s_rad", "0"),
     ];
     let scenario = scenario("pd_2", &far);
-    for level in levels() {
+    for (_, level) in levels() {
         let seeds = [1, 2, 3, 4, 5];
         let mut alone = Fleet::by(None, &scenario, &seeds).unwrap();
         let mut together = Fleet::by(Some(level), &scenario, &seeds).unwrap();
@@ -212,7 +212,7 @@ fn a_motion_that_cannot_be_followed_is_told_until_its_shaft_begins_anew() {
     for lag in [&[][..], &[("rig.actuator_time_constant_s", "0.003")]] {
         let set: Vec<_> = lag.iter().copied().chain([("rig.dac.quantised", "false")]).collect();
         let scenario = scenario("motor_pid", &set);
-        for level in [None].into_iter().chain(levels().into_iter().map(Some)) {
+        for level in [None].into_iter().chain(levels().into_iter().map(|(_, level)| Some(level))) {
             let mut fleet = Fleet::by(level, &scenario, &[1, 2, 3, 4]).unwrap();
             let mut volts = row(&fleet, Quantity::LawVoltage);
             fleet.step(&volts).unwrap();

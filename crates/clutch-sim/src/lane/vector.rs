@@ -67,20 +67,21 @@ instructions! {
     #[cfg(target_arch = "aarch64")] Neon;
 }
 
-/// The levels that this processor has, the lowest first.
-#[cfg(test)]
-pub(crate) fn levels() -> Vec<Level> {
+/// The levels that this processor has, the lowest first, by the names of their instructions.
+pub(crate) fn levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     let lower = [
-        best.as_sse2().map(Level::Sse2),
-        best.as_sse4_2().map(Level::Sse4_2),
-        best.as_avx2().map(Level::Avx2),
-        best.as_avx512().map(Level::Avx512),
+        ("sse2", best.as_sse2().map(Level::Sse2)),
+        ("sse4.2", best.as_sse4_2().map(Level::Sse4_2)),
+        ("avx2", best.as_avx2().map(Level::Avx2)),
+        ("avx512", best.as_avx512().map(Level::Avx512)),
     ];
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    let lower = [Some(best)];
-    lower.into_iter().flatten().collect()
+    #[cfg(target_arch = "aarch64")]
+    let lower = [("neon", Some(best))];
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+    let lower = [("none", Some(best))];
+    lower.into_iter().filter_map(|(name, level)| Some((name, level?))).collect()
 }
 
 /// A register of doubles.

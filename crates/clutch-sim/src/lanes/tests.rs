@@ -114,7 +114,7 @@ fn elementary_functions_have_the_bits_of_libm_at_every_level() {
         (Function::Power(y), Box::new(move |x| libm::pow(x, y)) as Alone, few.collect())
     });
     for (function, alone, numbers) in cases.chain(powers) {
-        for level in levels() {
+        for (_, level) in levels() {
             let together = at(level, Of(function, &numbers)).unwrap();
             for (x, y) in numbers.iter().zip(together) {
                 assert_eq!(alone(*x).to_bits(), y.to_bits(), "{function:?} of {x:e} at {level:?}");
@@ -150,7 +150,7 @@ fn a_motion_that_stops_just_as_the_period_ends_stops_in_lanes_too() {
     let alone = Flow { drive, excess: drive, unit: 1.0, drag: 0.0, stribeck: 0.0, edge: LINEAR_ABOVE };
     let (end, stops) = alone.run(State::at(speed), rest).unwrap();
     assert!(stops && end.time == rest, "alone: {stops}, at {} s", end.time);
-    for level in levels() {
+    for (_, level) in levels() {
         let (done, stops, time) = at(level, Slows { drive, speed, rest }).unwrap();
         assert_eq!((done, stops, time), (true, true, rest), "{level:?}");
     }
@@ -200,7 +200,7 @@ fn same_bits(scenarios: &[Scenario]) -> usize {
         .map(|r| (r.metrics, r.detected))
         .collect();
     let mut went = 0;
-    for level in levels() {
+    for (_, level) in levels() {
         let (together, whole) = together(level, scenarios, &|| false);
         assert!(whole);
         went = together.len();
@@ -463,7 +463,7 @@ fn a_run_that_is_not_for_lanes_goes_alone() {
         ("rig.drive", "{ sine = { mean_nm = 0.05, amplitude_nm = 0.01, frequency_hz = 1.0 } }"),
     ] {
         let scenarios = around("pd_2", &[], &[more, ("run.duration_s", "1.5")], 3);
-        assert_eq!(together(levels()[0], &scenarios, &|| false), (vec![], true), "{more:?}");
+        assert_eq!(together(levels()[0].1, &scenarios, &|| false), (vec![], true), "{more:?}");
     }
 }
 
@@ -473,7 +473,7 @@ fn a_run_that_is_stopped_is_not_told() {
     for after in [0, 5, 9, 10, 11] {
         let asked = Cell::new(0);
         let stop = || asked.replace(asked.get() + 1) >= after;
-        assert_eq!(together(levels()[0], &scenarios, &stop), (vec![], false), "after {after} questions");
+        assert_eq!(together(levels()[0].1, &scenarios, &stop), (vec![], false), "after {after} questions");
     }
 }
 
