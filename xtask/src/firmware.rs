@@ -17,10 +17,17 @@ pub(crate) const BOARDS: [(&str, &str); 3] = [
     ("clutch-pico-rp2040", "thumbv6m-none-eabi"),
 ];
 
+/// The run of `nucleo-alone`, if none is named.
+const RUN: &str = "firmware/nucleo-g474re/src/alone_run.rs";
+
 #[derive(Subcommand)]
 pub(crate) enum Verb {
     /// Builds the images of all boards, in target/firmware; adds the Rust targets.
-    Build,
+    Build {
+        /// The run of `nucleo-alone`, as of `clutch scenario rust`; default: that of the tree.
+        #[arg(long, value_name = "FILE")]
+        run: Option<PathBuf>,
+    },
     /// Builds a board's image and flashes it, with probe-rs.
     Flash {
         /// The board.
@@ -29,6 +36,9 @@ pub(crate) enum Verb {
         /// The role of the board.
         #[arg(long, value_enum)]
         role: Role,
+        /// With the role alone: the run that is compiled in, as of `clutch scenario rust`; default: that of the tree.
+        #[arg(long, value_name = "FILE")]
+        run: Option<PathBuf>,
     },
     /// Prints the flash and memory that the images take.
     Size,
@@ -56,14 +66,14 @@ pub(crate) enum Role {
     Controller,
     /// The board samples and obeys: clutch loop --port.
     Daq,
-    /// The board closes the loop without a host, with the run of firmware/nucleo-g474re/src/alone_run.rs; NUCLEO alone.
+    /// The board closes the loop without a host, with a run that is compiled in; NUCLEO alone.
     Alone,
 }
 
 pub(crate) fn run(verb: &Verb) -> Result<()> {
     match verb {
-        Verb::Build => build(),
-        Verb::Flash { board, role } => flash(*board, *role),
+        Verb::Build { run } => build(run.as_deref()),
+        Verb::Flash { board, role, run } => flash(*board, *role, run.as_deref()),
         Verb::Size => report("size"),
         Verb::Budget => report("budget"),
         Verb::Stack => report("stack"),
@@ -100,10 +110,10 @@ pub(crate) fn folder(target: &str) -> PathBuf {
     root().join("target/firmware").join(target).join("release")
 }
 
-/// Builds all images.
-pub(crate) fn build() -> Result<()> {
+/// Builds all images, `nucleo-alone` with a run if one is named.
+pub(crate) fn build(run: Option<&Path>) -> Result<()> {
     for board in BOARDS {
-        build_one(board)?;
+        build_one(board, run)?;
     }
     for (board, target) in BOARDS {
         println!("images of {board}: {}", folder(target).display());
@@ -111,11 +121,16 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-fn build_one(board: (&str, &str)) -> Result<()> {
+fn build_one(board: (&str, &str), run: Option<&Path>) -> Result<()> {
     program("rustup").args(["target", "add", board.1]).run().with_context(|| {
         format!("the board's Rust target is missing, and there is no rustup to add it: install {}", board.1)
     })?;
-    image(board).run().or_else(|why| bail!("{why:#}\n{}", panicking(board)?))
+    let image = match run {
+        // build.rs of the board reads it, in its own folder.
+        Some(run) => image(board).env("CLUTCH_RUN", std::path::absolute(run)?),
+        None => image(board),
+    };
+    image.run().or_else(|why| bail!("{why:#}\n{}", panicking(board)?))
 }
 
 /// The places that keep a board's images from being linked because they call for a panic; nothing, if they are kept by another
@@ -140,7 +155,7 @@ pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
     Ok(places)
 }
 
-fn flash(board: Flashed, role: Role) -> Result<()> {
+fn flash(board: Flashed, role: Role, run: Option<&Path>) -> Result<()> {
     if program("probe-rs").args(["--version"]).quietly().is_err() {
         bail!("probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see https://probe.rs");
     }
@@ -148,20 +163,25 @@ fn flash(board: Flashed, role: Role) -> Result<()> {
         Flashed::Nucleo => (BOARDS[1], "nucleo", "STM32G474RETx"),
         Flashed::Pico => (BOARDS[2], "pico", "RP2040"),
     };
-    build_one(package)?;
     let role = match role {
-        Role::Controller => "controller",
-        Role::Daq => "daq",
         Role::Alone if name == "pico" => {
             bail!("--role alone: expected with --board nucleo, which has a button")
         }
         Role::Alone => "alone",
+        _ if run.is_some() => {
+            bail!("--run: expected with --role alone, the image that has a run compiled in")
+        }
+        Role::Controller => "controller",
+        Role::Daq => "daq",
     };
     if role == "alone" {
         // Whose run it is, and what is known of its gains.
-        let run = std::fs::read_to_string(root().join("firmware/nucleo-g474re/src/alone_run.rs"))?;
-        run.lines().map_while(|line| line.strip_prefix("//!")).for_each(|line| println!("{}", line.trim()));
+        let of_tree = root().join(RUN);
+        let run = run.unwrap_or(&of_tree);
+        let text = std::fs::read_to_string(run).with_context(|| format!("--run {}", run.display()))?;
+        text.lines().map_while(|line| line.strip_prefix("//!")).for_each(|line| println!("{}", line.trim()));
     }
+    build_one(package, run)?;
     let image = folder(package.1).join(format!("{name}-{role}"));
     program("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&image).run()?;
     program("probe-rs").args(["reset", "--chip", chip]).run()

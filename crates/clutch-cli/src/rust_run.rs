@@ -10,10 +10,8 @@ use std::fmt::Debug;
 ///
 /// The image nucleo-alone has its run from such a file.
 #[derive(Args)]
-#[command(
-    after_help = "Example:\n  clutch scenario rust mine.toml > firmware/nucleo-g474re/src/alone_run.rs\n  \
-    cargo xtask firmware flash --role alone"
-)]
+#[command(after_help = "Example:\n  clutch scenario rust mine.toml > mine_run.rs\n  \
+    cargo xtask firmware flash --role alone --run mine_run.rs")]
 pub(crate) struct RustVerb {
     #[command(flatten)]
     run: CompiledArgs,

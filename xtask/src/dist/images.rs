@@ -14,7 +14,7 @@ const IMAGES: [(&str, &[&str]); 2] = [
 
 /// Builds them, and lays them into a folder.
 pub(super) fn stripped(folder: &Path) -> Result<()> {
-    firmware::build()?;
+    firmware::build(None)?;
     std::fs::create_dir_all(folder)?;
     for (target, images) in IMAGES {
         for image in images {

@@ -2,10 +2,8 @@
 #![no_std]
 #![no_main]
 
-// Written by `clutch scenario rust`, and compared with what that prints.
-#[rustfmt::skip]
-#[path = "../alone_run.rs"]
-mod alone_run;
+// The module `alone_run`, written by `clutch scenario rust`: the file that build.rs chose.
+include!(concat!(env!("OUT_DIR"), "/alone_run.rs"));
 
 use clutch_node::Hardware as _;
 use clutch_nucleo_g474re::board::{self, Board, Line, READ_BACK};
