@@ -9,7 +9,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::{Added, Separate};
-use clutch_identify::experiment::{ExperimentError, PartRunner};
+use clutch_identify::experiment::{ExperimentError, PartRunner, folder_for_logs};
 use clutch_identify::recording::MOST_TABLE_MIB;
 use clutch_identify::{Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
@@ -176,8 +176,8 @@ impl Identify {
         experiment.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
         remark(&folded(&plan));
         if let Some(folder) = &self.log {
-            std::fs::create_dir_all(folder)
-                .with_context(|| format!("{}: cannot be made", folder.display()))?;
+            // Before anything moves.
+            folder_for_logs(folder)?;
         }
         #[cfg(target_os = "linux")]
         if let Some(port) = &self.port {

@@ -948,6 +948,13 @@ fn identify_asks_for_consent_on_a_board_and_names_what_it_cannot_read() {
     let o = clutch(&["identify", "--port", "/dev/none", "--log", &logs]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("--uncertified is your consent"), "{}", err(&o));
+    // An experiment's logs are never written over, whatever the board.
+    std::fs::create_dir_all(dir.join("logs")).expect("a folder");
+    std::fs::write(dir.join("logs/ride_5.mcap"), "a ride").expect("a file");
+    let o = clutch(&["identify", "board_smc_2", "--log", &logs]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("holds logs already, as ride_5.mcap; name another folder"), "{}", err(&o));
+    assert_eq!(std::fs::read_to_string(dir.join("logs/ride_5.mcap")).expect("it is there"), "a ride");
     let table = dir.join("t.csv");
     std::fs::write(&table, "n,u\n0,4.5\n1,4.5\n").expect("a file");
     let table = table.display().to_string();

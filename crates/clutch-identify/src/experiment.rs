@@ -12,7 +12,7 @@ use crate::release;
 use clutch_core::edge_timed::waves_for;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Real};
-use clutch_log::{LogWriter, Source};
+use clutch_log::{LogError, LogWriter, Source};
 use clutch_loop::build_error::BuildError;
 use clutch_loop::cause_words::cause_text;
 use clutch_loop::from_scenario::{self, BuiltRun};
@@ -23,7 +23,7 @@ use clutch_loop::virtual_time::{VirtualError, VirtualLoop, VirtualOptions};
 use clutch_node::ControllerNode;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// The parts of the experiment.
@@ -153,7 +153,15 @@ pub enum ExperimentError {
     Virtual(#[from] VirtualError),
     /// A log.
     #[error(transparent)]
-    Log(#[from] clutch_log::LogError),
+    Log(#[from] LogError),
+    /// Logs are never written over: they may be the only record of an experiment.
+    #[error("{}: holds logs already, as {file}; name another folder for the logs", folder.display())]
+    HoldsLogs {
+        /// The folder.
+        folder: PathBuf,
+        /// One of them.
+        file: String,
+    },
     /// The output does not let go.
     #[error("output.lowest_v = {0}: expected 0, as a release lets the brake go, or at most 0")]
     NoRelease(f64),
@@ -195,6 +203,23 @@ pub enum ExperimentError {
     /// Something else that runs a part.
     #[error("{0}")]
     Runs(String),
+}
+
+/// A new folder for the logs of an experiment: it is made if it is not there, and holds none yet.
+///
+/// # Errors
+/// A log of whatever part; a folder that cannot be made or read.
+pub fn folder_for_logs(folder: &Path) -> Result<(), ExperimentError> {
+    let io = |source| LogError::Io { path: folder.into(), action: "cannot be made or read", source };
+    std::fs::create_dir_all(folder).map_err(io)?;
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if path.extension().is_some_and(|ending| ending == "mcap") {
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            return Err(ExperimentError::HoldsLogs { folder: folder.to_owned(), file });
+        }
+    }
+    Ok(())
 }
 
 /// A function that makes one run of the loop, given the part's name and its scenario, and gives the recordings.

@@ -6,14 +6,15 @@ use crate::log::read_unless_interrupted;
 use crate::stepping::native;
 use clutch_core::ActuatorKind;
 use clutch_identify::added::Added;
-use clutch_identify::experiment::{ExperimentError, PartRunner};
+use clutch_identify::experiment::{ExperimentError, PartRunner, folder_for_logs};
 use clutch_identify::recording::{MOST_TABLE_MIB, ReadError};
 use clutch_identify::shown::{MOTOR_ROWS, ROWS};
 use clutch_identify::{Consent, Experiment, Identified, Recording, RigFile, believed};
+use clutch_log::LogError;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::read_text_up_to;
 use clutch_tune::Options;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyFileExistsError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -88,8 +89,10 @@ pub(crate) fn identify<'py>(
         None => None,
     };
     if let Some(folder) = &log {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| os_error(py, folder, &format!("{}: cannot be made", folder.display()), &e))?;
+        folder_for_logs(folder).map_err(|e| match &e {
+            ExperimentError::Log(LogError::Io { source, .. }) => os_error(py, folder, &e.to_string(), source),
+            _ => PyFileExistsError::new_err(e.to_string()),
+        })?;
     }
     let found = py.detach(|| {
         let recordings = if logs.is_empty() {
