@@ -25,7 +25,6 @@ NOT_HERE = {
     "clutch daq": "it goes on until it is stopped; tests/loop stops it",
     "clutch hil": "it needs an emulator and an image for it; tests/hil has both",
     " --loaded ": "it needs experiments on two rigs; crates/clutch-cli/tests/cli.rs has it",
-    "> firmware/": "it writes into a checkout; tests/scenario/rust_run.rs has it",
     "=R ": "it has letters in place of numbers",
 }
 
