@@ -24,9 +24,7 @@ def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
     """A run for each pair of gains, of which only figures are kept; their mean."""
     kp, kd = zip(*pairs, strict=True)
     samples = clutch.samples({"law.pd.kp_v_rad": kp, "law.pd.kd_v_s_rad": kd})
-    table = clutch.sweep(job, samples, metrics=METRICS, progress=False).table
-    sticks = table["stick_slip_cycles_per_s"] * table["measured_s"]
-    return Figures(float(table["rms_error_rad"].mean()), float(table["max_error_rad"].mean()), float(sticks.mean()))
+    return mean(clutch.sweep(job, samples, metrics=METRICS, progress=False).table)
 
 
 def run_in(instructions: str, job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
@@ -36,5 +34,10 @@ def run_in(instructions: str, job: clutch.Scenario, pairs: list[tuple[float, flo
     sweep.start()
     while not sweep.wait(10.0):
         pass
-    rms, most, rate, measured = (sweep.result()[0][name] for name in METRICS)
+    return mean(sweep.result()[0])
+
+
+def mean(table: clutch.Table) -> Figures:
+    """Of all rows."""
+    rms, most, rate, measured = (table[name] for name in METRICS)
     return Figures(float(rms.mean()), float(most.mean()), float((rate * measured).mean()))

@@ -88,43 +88,24 @@ def many_runs(job: str, quick: bool) -> list[Row]:
     rounds = 3 if quick else 5
     targets = {"numba": 350.0, "c": 40.0} if job == "J20" else {"numba": 25.0, "c": 4.0}
     numba = Candidate("numba RK4, 10 steps a sample, prange", lambda: numba_peer.run_many(job, n), 1)
-    peers = [(numba, targets["numba"])]
-    known = c_peer.instructions()
-    if known:
-        name, _, march = known[0]
-        peers.append((brute(job, n, name, march, rounds), targets["c"]))
     mine = Candidate("clutch.sweep", lambda: ours.run_many(scenario, pairs), rounds)
-    interleave([*(c for c, _ in peers), mine])
-    section = f"{n} runs, {job}"
-    simulated = n * DURATION
-    rows = [Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / mine.cpu, target) for c, target in peers]
-    rows.append(Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result))
-    for name, ours_name, march in known[1:]:
-        rows += many_runs_in(job, n, (name, ours_name, march), rounds)
+    turns = [("", [(numba, targets["numba"])], mine)]
+    for i, (name, ours_name, march) in enumerate(c_peer.instructions()):
+        c_peer.build(march)
+        brute = functools.partial(c_peer.run_many, job, n, march)
+        peer = (Candidate(f"C in vectors, RK4, 10 steps a sample, {name}", brute, rounds), targets["c"])
+        if i == 0:  # the widest, which clutch takes by itself
+            turns[0][1].append(peer)
+        else:
+            narrow = functools.partial(ours.run_in, ours_name, scenario, pairs)
+            turns.append((f", {name} only", [peer], Candidate("clutch.sweep", narrow, rounds)))
+    rows = []
+    for only, peers, our in turns:
+        interleave([*(c for c, _ in peers), our])
+        section, simulated = f"{n} runs, {job}{only}", n * DURATION
+        rows += [Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / our.cpu, to) for c, to in peers]
+        rows.append(Row(section, our.name, our.cpu, simulated / our.cpu, our.result))
     return rows
-
-
-def brute(job: str, n: int, name: str, march: str, rounds: int) -> Candidate:
-    """C in vectors, compiled before anything is timed."""
-    c_peer.build(march)
-    work = functools.partial(c_peer.run_many, job, n, march)
-    return Candidate(f"C in vectors, RK4, 10 steps a sample, {name}", work, rounds)
-
-
-def many_runs_in(job: str, n: int, instructions: tuple[str, str, str], rounds: int) -> list[Row]:
-    """As `many_runs`, C and clutch both with instructions that are not the widest of this processor."""
-    name, ours_name, march = instructions
-    scenario, pairs = ours.scenario(job), gains(n)
-    c = brute(job, n, name, march, rounds)
-    mine = Candidate("clutch.sweep", functools.partial(ours.run_in, ours_name, scenario, pairs), rounds)
-    interleave([c, mine])
-    section = f"{n} runs, {job}, {name} only"
-    target = 40.0 if job == "J20" else 4.0
-    simulated = n * DURATION
-    return [
-        Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / mine.cpu, target),
-        Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result),
-    ]
 
 
 def scaling(section: str, cells: list[tuple[str, int, float, Candidate]], per_second: bool) -> list[Row]:

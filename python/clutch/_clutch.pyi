@@ -73,10 +73,11 @@ class Log:
         """
         The stretch that a picture shows closely, as `Run.window`, and the times at rest, as `Run.sticks`.
         """
-    def replay(self, /, scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None, Any]:
+    def replay(self, /, scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None) -> tuple[Table, tuple[int, int], tuple[int, str, float, float] | None, Any]:
         """
         Feeds the recorded counts to the recorded law, to another scenario's, or to one written in Python: commands of the
-        replay, ticks, the first difference (tick, field, logged, replayed), and the drift of friction over load.
+        replay, ticks compared and ticks behind a gap, the first difference (tick, field, logged, replayed), and the drift of
+        friction over load.
         """
     @property
     def scenario_toml(self, /) -> str:

@@ -186,6 +186,8 @@ class Replay:
     ----------
     ticks : int
         Commands compared.
+    behind_gap : int
+        Commands behind the log's first gap, which are not comparable: a damaged part, or records that were dropped.
     first : Difference or None
         The first difference, if there is one.
     commands : Table
@@ -198,19 +200,20 @@ class Replay:
     See :func:`clutch.replay`.
 
     >>> import clutch
-    >>> clutch.Replay(ticks=0, first=None, commands=clutch.Table({}), drift={}).identical
+    >>> clutch.Replay(ticks=0, behind_gap=0, first=None, commands=clutch.Table({}), drift={}).identical
     True
     """
 
     ticks: int
+    behind_gap: int
     first: Difference | None
     commands: Table
     drift: dict[str, Any]
 
     @property
     def identical(self) -> bool:
-        """True if every output agrees with the log, bit for bit."""
-        return self.first is None
+        """True if every output agrees with the log, bit for bit, and none is behind a gap."""
+        return self.first is None and self.behind_gap == 0
 
 
 def read_log(path: str | os.PathLike[str]) -> Log:
@@ -288,9 +291,9 @@ def replay(
     """
     opened = log if isinstance(log, Log) else read_log(log)
     changed = opened.scenario.override(overrides)._native if overrides else None
-    commands, ticks, first, drift = opened._log.replay(changed, as_law(law))
+    commands, (ticks, behind_gap), first, drift = opened._log.replay(changed, as_law(law))
     difference = None
     if first is not None:
         tick, field, logged, replayed = first
         difference = Difference(tick=tick, field=field, logged=logged, replayed=replayed)
-    return Replay(ticks=ticks, first=difference, commands=commands, drift=drift)
+    return Replay(ticks=ticks, behind_gap=behind_gap, first=difference, commands=commands, drift=drift)

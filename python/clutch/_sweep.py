@@ -365,7 +365,7 @@ def sweep(
         sweep, with ``errors="keep"``, too.
     metrics
         Names of fields of `Metrics`, and "certified_continuous_time": true if the gains are certified so for the row's
-        bounds. Default: all of them.
+        bounds. Default: all of them but the meter's bounds, which a sweep does not have.
     seeds
         A number n for the seeds 1 … n, or seeds: each row is run with each. One run is one draw; compare
         over several seeds.

@@ -99,6 +99,20 @@ def test_an_export_that_cannot_be_is_refused_and_leaves_nothing(smc_log, tmp_pat
 # --- Ctrl-C --------------------------------------------------------------------------------------
 
 
+def test_a_replay_says_how_many_commands_are_behind_a_gap_and_is_then_not_identical(tmp_path):
+    log = tmp_path / "run.mcap"
+    clutch.simulate("smc_2").save(log)
+    whole = clutch.replay(log)
+    assert whole.identical and whole.behind_gap == 0
+    damaged = bytearray(log.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    log.write_bytes(damaged)
+    found = clutch.replay(log)
+    assert found.first is None and not found.identical
+    # A part of the log cannot be read: what is behind it can, and is not comparable.
+    assert found.behind_gap > 0 and 0 < found.ticks < found.ticks + found.behind_gap < whole.ticks
+
+
 def test_save_read_and_replay_hear_an_interrupt(tmp_path):
     run = clutch.simulate("bench_smc_2", overrides={"run.duration_s": 250.0})
     whole = tmp_path / "whole.mcap"

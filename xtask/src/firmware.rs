@@ -100,6 +100,14 @@ pub(crate) fn image((board, target): (&str, &str)) -> Program {
     in_firmware(["build", "--release", "--locked", "--package", board, "--target", target])
 }
 
+/// The same, with a run for `nucleo-alone` if one is named: build.rs of the board reads it, in its own folder.
+fn image_of(board: (&str, &str), run: Option<&Path>) -> Result<Program> {
+    Ok(match run {
+        Some(run) => image(board).env("CLUTCH_RUN", std::path::absolute(run)?),
+        None => image(board),
+    })
+}
+
 /// A cargo in the folder of the images, where a file has the flags.
 pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
     cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
@@ -125,19 +133,15 @@ fn build_one(board: (&str, &str), run: Option<&Path>) -> Result<()> {
     program("rustup").args(["target", "add", board.1]).run().with_context(|| {
         format!("the board's Rust target is missing, and there is no rustup to add it: install {}", board.1)
     })?;
-    let image = match run {
-        // build.rs of the board reads it, in its own folder.
-        Some(run) => image(board).env("CLUTCH_RUN", std::path::absolute(run)?),
-        None => image(board),
-    };
-    image.run().or_else(|why| bail!("{why:#}\n{}", panicking(board)?))
+    image_of(board, run)?.run().or_else(|why| bail!("{why:#}\n{}", panicking(board, run)?))
 }
 
 /// The places that keep a board's images from being linked because they call for a panic; nothing, if they are kept by another
 /// error.
-pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
+pub(crate) fn panicking(board: (&str, &str), run: Option<&Path>) -> Result<String> {
+    let target = board.1;
     let named = root().join("target/firmware_named");
-    let image = panic_path::in_spite(image((board, target)), target).arg("--target-dir").arg(&named);
+    let image = panic_path::in_spite(image_of(board, run)?, target).arg("--target-dir").arg(&named);
     let (built, _) = image.silently()?;
     if !built {
         return Ok(String::new());
@@ -156,9 +160,6 @@ pub(crate) fn panicking((board, target): (&str, &str)) -> Result<String> {
 }
 
 fn flash(board: Flashed, role: Role, run: Option<&Path>) -> Result<()> {
-    if program("probe-rs").args(["--version"]).quietly().is_err() {
-        bail!("probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see https://probe.rs");
-    }
     let (package, name, chip) = match board {
         Flashed::Nucleo => (BOARDS[1], "nucleo", "STM32G474RETx"),
         Flashed::Pico => (BOARDS[2], "pico", "RP2040"),
@@ -174,6 +175,9 @@ fn flash(board: Flashed, role: Role, run: Option<&Path>) -> Result<()> {
         Role::Controller => "controller",
         Role::Daq => "daq",
     };
+    if program("probe-rs").args(["--version"]).quietly().is_err() {
+        bail!("probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see https://probe.rs");
+    }
     if role == "alone" {
         // Whose run it is, and what is known of its gains.
         let of_tree = root().join(RUN);

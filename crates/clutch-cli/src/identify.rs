@@ -172,13 +172,13 @@ impl Identify {
     fn experiment(&self, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
         let consent = Consent { travel_deg: self.travel, fastest_deg_s: self.fastest };
         let experiment = Experiment::of(scenario, &consent)?;
-        let mut plan = format!("{:.0} s of experiment on {}\n", experiment.seconds(), self.place());
-        experiment.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
-        remark(&folded(&plan));
         if let Some(folder) = &self.log {
             // Before anything moves.
             folder_for_logs(folder)?;
         }
+        let mut plan = format!("{:.0} s of experiment on {}\n", experiment.seconds(), self.place());
+        experiment.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
+        remark(&folded(&plan));
         #[cfg(target_os = "linux")]
         if let Some(port) = &self.port {
             return self.at_port(port, scenario, &experiment);

@@ -156,7 +156,8 @@ impl Log {
     }
 
     /// Feeds the recorded counts to the recorded law, to another scenario's, or to one written in Python: commands of the
-    /// replay, ticks, the first difference (tick, field, logged, replayed), and the drift of friction over load.
+    /// replay, ticks compared and ticks behind a gap, the first difference (tick, field, logged, replayed), and the drift of
+    /// friction over load.
     #[pyo3(signature = (scenario=None, law=None))]
     #[allow(clippy::type_complexity, reason = "the parts of clutch.replay's object")]
     fn replay<'py>(
@@ -164,7 +165,7 @@ impl Log {
         py: Python<'py>,
         scenario: Option<&Scenario>,
         law: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<(Table, usize, Option<(u64, String, f64, f64)>, Bound<'py, PyAny>)> {
+    ) -> PyResult<(Table, (usize, usize), Option<(u64, String, f64, f64)>, Bound<'py, PyAny>)> {
         let scenario = match scenario {
             Some(other) => other.clone(),
             None => self.scenario(py)?,
@@ -192,7 +193,7 @@ impl Log {
         let terms = &self.log.header.term_names;
         Ok((
             made(py, || table(&replayed.commands, terms))?,
-            replayed.commands.len(),
+            (replayed.commands.len(), replayed.behind_gap),
             first,
             from_json(py, &drift.to_json())?,
         ))

@@ -53,7 +53,7 @@ impl Detected {
         self.told_cycles_per_s.is_none().then(|| {
             let [least, most] = self.bounds();
             format!(
-                "counts and voltage leave {} to {} cycles/s: gaps between two edges last long enough for a stick \
+                "counts and voltage leave {} to {} cycles/s, sticks within one count as one: gaps between two edges last long enough for a stick \
                  unseen, and the voltage falls far enough in them; a finer encoder, or another rate, shows more",
                 number(least),
                 number(most)

@@ -262,7 +262,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     tally.stage("images");
     for board in firmware::BOARDS {
         let (built, text) = firmware::image(board).quietly()?;
-        let text = if built { text } else { text + &firmware::panicking(board)? };
+        let text = if built { text } else { text + &firmware::panicking(board, None)? };
         tally.check_quiet(&format!("the images of {} build", board.0), (built, text));
         let small = firmware::image(board).args(SMALL).args(["--target-dir", "../target/firmware_small"]);
         tally.check_quiet(&format!("they build at opt-level s ({})", board.0), small.quietly()?);
