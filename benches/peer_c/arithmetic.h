@@ -68,7 +68,7 @@ static inline float smc_sign(const peer_smc_law *l, float *offset, const peer_ti
     return output(&l->output, offset, -(l->kp * sgn(surface)) - l->kd * sgn(across) * t->error_rate);
 }
 
-/* The integral follows a limit, and keeps within what the output can answer. What is no number leaves it as it is. */
+/* The integral follows a limit, and keeps within what the output can answer. A demand that is no number leaves it as it is. */
 static inline float pid(const peer_pid_law *l, peer_pid_memory *m, const peer_tick *t)
 {
     float forward = l->bias - l->coulomb * sgn(t->target_velocity) - l->velocity * t->target_velocity

@@ -5,7 +5,7 @@
 #include "laws.h"
 #include <stdint.h>
 
-/* What a period takes from the host: a position in 2^-16 counts, rad/s, rad/s^2. */
+/* Input of a period, from the host: a position in 2^-16 counts, rad/s, rad/s^2. */
 typedef struct { int32_t position; float velocity, acceleration; } peer_target;
 /* Radians of a part of a count, the two factors of (5), the converter's voltage of code 0, its codes per volt and
  * its highest code. */

@@ -241,7 +241,7 @@ static void arm(const clutch_arm_t *m, uint32_t now_us)
         return;
     }
     if (m->boot != b.params.boot) {
-        /* Whoever has not heard Hello is not told either. */
+        /* A controller that has not heard Hello hears no answer either. */
         refuse(CLUTCH_ARM_KIND, CLUTCH_REFUSAL_BOOT, 0);
         return;
     }

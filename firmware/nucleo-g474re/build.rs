@@ -1,4 +1,4 @@
-//! Which run `nucleo-alone` has compiled in: the file that `CLUTCH_RUN` names (`cargo xtask firmware … --run`), or that of the tree.
+//! The run that `nucleo-alone` has compiled in: the file that `CLUTCH_RUN` names (`cargo xtask firmware … --run`), or that of the tree.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

@@ -23,8 +23,8 @@ class Certificate(_Record):
         Version of clutch.
     law : str
         The law.
-    certified : bool
-        True if the gains are certified.
+    certified_continuous_time : bool
+        True if the gains are certified in continuous time, with an exact sensor.
     reason : str or None
         The missing part; None if certified.
     rig_outside_bounds : tuple of str
@@ -316,7 +316,7 @@ class Certificate(_Record):
     scenario: str
     version: str
     law: str
-    certified: bool
+    certified_continuous_time: bool
     reason: str | None
     rig_outside_bounds: tuple[str, ...]
     bounds: Bounds
@@ -336,4 +336,4 @@ class Certificate(_Record):
         sampled = self.sampled
         if sampled.looked_for:
             return sampled.error_bound_rad is not None and (sampled.stable is True or sampled.any_law)
-        return self.certified and (sampled.stable is not False or sampled.any_law)
+        return self.certified_continuous_time and (sampled.stable is not False or sampled.any_law)

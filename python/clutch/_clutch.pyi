@@ -351,6 +351,11 @@ class Scenario:
         """
         The path, sampled.
         """
+    def surface(self, /) -> tuple[float, float] | None:
+        """
+        Slope, 1/s, and layer, rad/s, of the sliding surface of law or shell; none of a law without one, or of a path that cannot be
+        followed.
+        """
     def tables(self, /) -> dict[str, Any]:
         """
         Every table with its defaults filled in.
@@ -888,7 +893,7 @@ def steady_friction(scenario: Scenario, velocity: NDArray[np.float64]) -> NDArra
     Coefficients of the steady friction of a scenario's rig at some velocities, rad/s, with their signs.
     """
 
-def tune(scenario: _model.Scenario | Scenario, file: str | None, rates_deg_s: Sequence[float], candidates: SupportsIndex, uncertified: bool) -> tuple[dict[str, Any], list[str | None], str, str | None]:
+def tune(scenario: _model.Scenario | Scenario, file: tuple[str, str] | None, rates_deg_s: Sequence[float], candidates: SupportsIndex, uncertified: bool) -> tuple[dict[str, Any], list[str | None], str, str | None]:
     """
     Tunes a scenario: the object that `clutch tune --json` prints, and what goes with it.
     """

@@ -144,7 +144,7 @@ def loop(
     certificate: str | os.PathLike[str] | None = None,
     release_test: Literal["auto", "always", "never"] = "auto",
     release_deg: float = _clutch.RELEASE_DEG,
-    on_drift: Literal["tell", "stop"] = "tell",
+    on_drift: Literal["report", "stop"] = "report",
     patient: bool = False,
     strict: bool = False,
     faults: Sequence[str] = (),
@@ -190,7 +190,7 @@ def loop(
         encoder and converter. "auto" does so on a serial device, where the scenario allows it.
     release_deg : float, default 0.1
         The longest way in that test of any shaft within the bounds, above 0 and up to 10°: a longer one finds more.
-    on_drift : {"tell", "stop"}
+    on_drift : {"report", "stop"}
         Effect of friction over load that leaves the bounds: the result and the log report it, or the run also ends in
         the safe state.
     patient : bool, default False

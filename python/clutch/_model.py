@@ -9,11 +9,11 @@ import os
 import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from clutch import _clutch, _tables
 from clutch._certificate import Certificate
-from clutch._record import _plain, _Record, _slots, _Tree, _written
+from clutch._record import _Params, _plain, _Record, _slots, _Tree, _written
 
 # Pickles, and code written by hand, look for every class of a scenario here.
 from clutch._tables import *  # noqa: F403
@@ -136,8 +136,8 @@ class Scenario(_tables._Scenario):
         ----------
         overrides : mapping of str to object
             Dotted keys, as ``law.smc.kp_v``, and their values in the keys' units. To change an alternative
-            set its table: ``{"law": {"pd": {}}}``. ``rig.base`` takes that rig instead of the present one;
-            other keys of the rig then change it.
+            set its table: ``{"law": {"pd": {}}}``, or an object of it: ``{"law": clutch.Pd()}``.
+            ``rig.base`` takes that rig instead of the present one; other keys of the rig then change it.
 
         Returns
         -------
@@ -157,6 +157,8 @@ class Scenario(_tables._Scenario):
         Ramp(rate_deg_s=6.0)
         >>> scenario.override({"law": {"pd": {}}}).law
         Pd(kp_v_rad=5000.0, kd_v_s_rad=50.0)
+        >>> scenario.override({"law": clutch.Smc(kp_v=4)}).law.kp_v
+        4.0
         """
         changes = _overrides(self.name, overrides)
         if "rig.base" in changes:
@@ -244,11 +246,35 @@ class Scenario(_tables._Scenario):
         return f"<table>{cells}</table>"
 
 
+def _below(cls: type[_Record]) -> Iterator[type[_Record]]:
+    """Subclasses, and theirs."""
+    for sub in cls.__subclasses__():
+        yield sub
+        yield from _below(sub)
+
+
+def _as_table(key: str, value: object) -> Any:
+    """A key's value as a file could hold it: Python numbers, lists and dicts, and a part of a scenario as its table."""
+    if isinstance(value, _Params):
+        table = value._tables()
+        *_, name = key.split(".")
+        *_, own = value._key.split(".")
+        tables: tuple[type[_Record], ...] = (Scenario, *_below(_Params))
+        homes = (slot for cls in tables for slot in _slots(cls) if slot.name == name)
+        if name != own and not any(type(value) in slot.classes for slot in homes):
+            raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
+        _, *way = value._way(name)
+        for step in reversed(way):
+            table = {step: table}
+        return table
+    return _plain(value)
+
+
 def _overrides(origin: str, given: Mapping[str, object]) -> _Tree:
     if not isinstance(given, Mapping):
         expected = "a mapping of dotted keys to values, as {'law.smc.kp_v': 4}"
         raise TypeError(f"overrides = {reprlib.repr(given)}: expected {expected}")
-    return {key: _written(origin, key, value) for key, value in given.items()}
+    return {key: _written(origin, key, _as_table(key, value)) for key, value in given.items()}
 
 
 def _leaves(part: _Record, prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ import sys
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,9 +21,7 @@ from clutch._clutch import Table
 from clutch._errors import ParamError
 from clutch._extras import needed
 from clutch._metrics import FIGURES
-from clutch._model import Scenario
-from clutch._record import _Params, _Record, _slots
-from clutch._record import _plain as _python
+from clutch._model import Scenario, _as_table
 from clutch._run import Law, Result, ScenarioLike, as_law, as_scenario, simulate
 from clutch._units import attributes
 
@@ -132,7 +130,7 @@ def grid(parameters: Mapping[str, Iterable[Any]]) -> Samples:
     ValueError
         No key, or a key without values.
     TypeError
-        The values of a key are not a sequence.
+        The values of a key are not a sequence, or one of them is missing.
 
     Examples
     --------
@@ -165,6 +163,8 @@ def samples(columns: Any) -> Samples:
     ------
     ValueError
         No column, or columns of unequal length.
+    TypeError
+        No table, or a row without a value.
 
     Examples
     --------
@@ -172,6 +172,9 @@ def samples(columns: Any) -> Samples:
     >>> clutch.samples({"law.smc.kp_v": [3.0, 4.0], "law.smc.boundary_rad_s": [0.1, 0.15]}).rows
     ((3.0, 0.1), (4.0, 0.15))
     """
+    if not isinstance(columns, Mapping) and not hasattr(columns, "columns"):
+        kind = type(columns).__name__
+        raise TypeError(f"parameters is of type {kind}: expected a dict of sequences, a table or a data frame")
     names = list(columns) if isinstance(columns, Mapping) else list(columns.columns)
     values = {name: _values(name, columns[name]) for name in names}
     lengths = {name: len(column) for name, column in values.items()}
@@ -290,35 +293,19 @@ def _values(key: str, values: Any) -> tuple[Any, ...]:
         raise TypeError(f"{key}: expected a sequence of values, got {values!r}")
     if isinstance(values, Sized):
         _room(key, len(values))
-    plain = tuple(_plain(key, v) for v in itertools.islice(values, _MOST_ROWS + 1))
+    plain = tuple(_as_table(key, v) for v in itertools.islice(values, _MOST_ROWS + 1))
     _room(key, len(plain))
+    for row, value in enumerate(plain):
+        if value is None or type(value).__name__ == "NAType":  # the gap of a data frame
+            raise TypeError(f"{key}: row {row} has no value ({value}): expected one in every row")
     if not plain:
         raise ValueError(f"{key}: no values")
     return plain
 
 
-def _below(cls: type[_Record]) -> Iterator[type[_Record]]:
-    """Subclasses, and theirs."""
-    for sub in cls.__subclasses__():
-        yield sub
-        yield from _below(sub)
-
-
-def _plain(key: str, value: Any) -> Any:
-    """A key's value as a file could hold it: Python numbers, lists and dicts."""
-    if isinstance(value, _Params):
-        table = value._tables()
-        *_, name = key.split(".")
-        *_, own = value._key.split(".")
-        tables: tuple[type[_Record], ...] = (Scenario, *_below(_Params))
-        homes = (slot for cls in tables for slot in _slots(cls) if slot.name == name)
-        if name != own and not any(type(value) in slot.classes for slot in homes):
-            raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
-        _, *way = value._way(name)
-        for step in reversed(way):
-            table = {step: table}
-        return table
-    return _python(value)
+def _origin(scenario: Scenario) -> dict[str, str]:
+    """The metadata of a file of rows, as those of the command's Parquet."""
+    return {"scenario": scenario.name, "version": _clutch.BUILD, "scenario.toml": scenario.to_toml()}
 
 
 # --- The sweep ---------------------------------------------------------------------------------
@@ -675,6 +662,11 @@ def _run_here(work: _Work, finished: _Finished, numbers: list[int], threads: int
 
 def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | None, show: _Progress) -> list[int]:
     """Run chunks on an executor; return the rows that it could not run."""
+    if not callable(getattr(executor, "submit", None)):
+        kind = type(executor).__name__
+        raise TypeError(
+            f"executor is of type {kind}: expected one with submit(function, *arguments), as clutch.executors"
+        )
     rows = finished.samples.rows
     work.job(rows, 1)  # an error in the request itself is raised here, not by a worker
     workers = executors._workers(executor)
@@ -1000,7 +992,7 @@ class SweepResult:
         return self.table.to_polars()
 
     def to_arrow(self) -> pyarrow.Table:
-        """The table as one of Arrow.
+        """The table as one of Arrow, with the scenario and the version of clutch in its metadata.
 
         Examples
         --------
@@ -1008,7 +1000,7 @@ class SweepResult:
         >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).to_arrow().num_rows
         2
         """
-        return self.table.to_arrow()
+        return self.table.to_arrow().replace_schema_metadata(_origin(self.base))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         return self.table.__arrow_c_stream__(requested_schema)

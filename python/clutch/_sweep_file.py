@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from clutch._extras import needed
+from clutch._model import Scenario
 from clutch._run import Law, ScenarioLike, as_scenario
-from clutch._sweep import _CERTIFIED, Samples, _chosen, _column, _known_metrics, _Progress, _text, sweep
+from clutch._sweep import _CERTIFIED, Samples, _chosen, _column, _known_metrics, _origin, _Progress, _text, sweep
 from clutch._units import attributes
 
 __all__ = ["SweptFile", "sweep_to_file"]
@@ -98,7 +99,7 @@ def sweep_to_file(
     FileExistsError
         The file is there already, and ``resume`` is False.
     ValueError
-        A file of another sweep; keys, metrics or options that do not exist.
+        A file of another sweep, or of another kind than CSV and Parquet; keys, metrics or options that do not exist.
 
     Examples
     --------
@@ -114,6 +115,8 @@ def sweep_to_file(
     chosen, _ = _chosen(parameters, seeds)
     names = _known_metrics(metrics)
     whole = out.suffix.lower() == ".parquet"
+    if not whole and out.suffix.lower() != ".csv":
+        raise ValueError(f"{out}: expected a name that ends with .csv or .parquet")
     if whole:
         with needed("pyarrow", "sweep_to_file with Parquet"):
             import pyarrow.csv  # noqa: F401  # before the sweep, and not at its end
@@ -151,7 +154,7 @@ def sweep_to_file(
             growth = _PAUSE_S / max(time.monotonic() - begun, 1e-3)
             size = min(max(int(size * min(max(growth, 0.25), 4.0)), 16), _ROWS[1])
     if whole and done == len(chosen):
-        _to_parquet(lines, out, chosen, names)
+        _to_parquet(lines, out, scenario, chosen, names)
         lines.unlink()
         lines = out
     return SweptFile(lines, done, len(chosen), before, refused, interrupted)
@@ -241,7 +244,7 @@ class _Lines:
             yield from (line for line in file if line.endswith(b"\n"))
 
 
-def _to_parquet(lines: Path, out: Path, chosen: Samples, metrics: Sequence[str]) -> None:
+def _to_parquet(lines: Path, out: Path, scenario: Scenario, chosen: Samples, metrics: Sequence[str]) -> None:
     """The same as Parquet, with units and labels in the fields, a part at a time."""
     import pyarrow
     from pyarrow import csv as reader
@@ -253,7 +256,8 @@ def _to_parquet(lines: Path, out: Path, chosen: Samples, metrics: Sequence[str])
         of = _column([row[i] for row in chosen.rows]).dtype
         kinds[key] = pyarrow.string() if of.kind == "O" else pyarrow.from_numpy_dtype(of)
     names = [*chosen.keys, *metrics, "error"]
-    schema = pyarrow.schema([pyarrow.field(name, kinds[name], metadata=attributes(name)) for name in names])
+    fields = [pyarrow.field(name, kinds[name], metadata=attributes(name)) for name in names]
+    schema = pyarrow.schema(fields, metadata=_origin(scenario))
     options = reader.ConvertOptions(column_types=kinds, strings_can_be_null=False)
     part = out.with_name(f"{out.name}.part")
     try:

@@ -1381,7 +1381,7 @@ class Model(_Params):
     drive_torque_nm : float, default 0.047088000000000005
         Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone. `T_u`: a finite number, N m; a
         torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor
-        (model.actuator): let the drive turn the shaft forwards, or take a motor.
+        (model.actuator): let the drive turn the shaft forwards, or turn the axis round, or take a motor.
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator

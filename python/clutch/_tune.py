@@ -79,6 +79,8 @@ class Identified:
     separate : dict of str to Estimate
         With logs of a known mass added: ``drive_torque_nm`` (T), ``inertia_kg_m2`` (J), ``grip_nm_v`` (μ_d K),
         ``grip_at_rest_nm_v`` (μ_s K), ``viscous_damping_nm_s_rad`` (C); those not found are in `refused`.
+    ripple_waves_per_turn : float or None
+        The likeliest waves of the ripple; None where rides do not show them.
     unexplained : tuple of str
         Ticks and recordings that the model does not explain.
     map : list of tuple of float
@@ -105,6 +107,7 @@ class Identified:
         apart: dict[str, dict[str, Any]] = told.get("separate", {})
         self.separate = {key: Estimate(**row) for key, row in apart.items() if "value" in row}
         self.refused |= {key: row["refused"] for key, row in apart.items() if "refused" in row}
+        self.ripple_waves_per_turn: float | None = told["ripple_waves_per_turn"]
         self.unexplained: tuple[str, ...] = tuple(told["unexplained"])
         self.map: list[tuple[float, float]] = [(angle, factor) for angle, factor in told["map"]]
         self.releases: int = told["releases"]
@@ -168,6 +171,15 @@ class Identified:
         return "Identified(" + ", ".join(rows) + ")"
 
 
+def _several(name: str, values: Iterable[Any] | None, what: str) -> list[Any]:
+    """Give the values of a list, an empty one for none; one text, path or number in its place is refused."""
+    if values is None:
+        return []
+    if isinstance(values, str | bytes | os.PathLike) or not isinstance(values, Iterable):
+        raise TypeError(f"{name} = {values!r}: expected a list of {what}")
+    return list(values)
+
+
 def _heavier(
     loaded: list[str], mass_kg: float | None, radius_m: float | None, *, alone: bool
 ) -> tuple[list[str], float, float] | None:
@@ -217,9 +229,9 @@ def identify(
     log : path, optional
         Folder for a log of each part of the experiment.
     travel_deg : float, optional
-        Way that a motor axis goes forwards from where it rests (20°).
+        Way that a motor axis goes forwards from where it rests, 10 to 3600°, 20° without it.
     fastest_deg_s : float, optional
-        Highest rate (60 °/s); of a brake 5 to 60 °/s.
+        Highest rate, 5 to 60 °/s of a brake and 15 to 3600 °/s of a motor axis; 60 °/s without it.
     overrides : mapping, optional
         Values for dotted keys of the scenario.
 
@@ -249,13 +261,24 @@ def identify(
     True
     """
     checked = as_scenario(scenario, overrides)
-    files = [os.fspath(path) for path in logs or ()]
+    files = [os.fspath(path) for path in _several("logs", logs, "paths")]
     if logs is not None and not files:
         raise ValueError("logs: expected at least one log, or None for an experiment on the simulated board")
     folder = None if log is None else os.fspath(log)
-    heavier = _heavier([os.fspath(path) for path in loaded], mass_kg, radius_m, alone=bool(files))
+    others = [os.fspath(path) for path in _several("loaded", loaded, "paths")]
+    heavier = _heavier(others, mass_kg, radius_m, alone=bool(files))
     told = _clutch.identify(checked._native, files, columns, heavier, folder, travel_deg, fastest_deg_s)
     return Identified(checked, told)
+
+
+def _rig_file(identified: Identified | str | os.PathLike[str]) -> tuple[str, str]:
+    """Name and text of a rig file."""
+    if isinstance(identified, Identified):
+        return "identified", identified.to_toml()
+    try:
+        return os.fspath(identified), Path(identified).read_text(encoding="utf-8")
+    except UnicodeDecodeError as e:
+        raise ValueError(f"{os.fspath(identified)}: expected a text in UTF-8, as of clutch identify --out: {e}") from e
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,7 +307,7 @@ class Candidate:
         Runs behind these figures, and those in which the shaft stuck.
     error_bound_rad : float or None
         The bound proven on the error, rad; None where none is, or none was looked for.
-    standing : str
+    outcome : str
         ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (it sticks from rest),
         ``"strays"``, ``"unstable"``.
     why : str
@@ -296,7 +319,7 @@ class Candidate:
     --------
     >>> import clutch
     >>> tuned = clutch.tune("board_smc_2", candidates=2)
-    >>> tuned.winner.standing
+    >>> tuned.winner.outcome
     'chosen'
     """
 
@@ -310,7 +333,7 @@ class Candidate:
     runs: int
     runs_with_sticks: int
     error_bound_rad: float | None
-    standing: Literal["chosen", "rougher", "uncertified", "refused", "strays", "unstable"]
+    outcome: Literal["chosen", "rougher", "uncertified", "refused", "strays", "unstable"]
     why: str
     scenario: Scenario | None
 
@@ -402,7 +425,7 @@ class Tuned:
         Examples
         --------
         >>> import clutch
-        >>> clutch.tune("board_smc_2", candidates=2).to_pandas()["standing"].iloc[0] in ("chosen", "uncertified")
+        >>> clutch.tune("board_smc_2", candidates=2).to_pandas()["outcome"].iloc[0] in ("chosen", "uncertified")
         True
         """
         with needed("pandas", "to_pandas"):
@@ -418,7 +441,7 @@ class Tuned:
         Parameters
         ----------
         seed : int, default 101
-            The disc; 101 to 108 are those that candidates are judged on, and no gain is chosen on them.
+            The disc; 101 to 108 are those that each law's best gains are judged on, and no gain is chosen on them.
         duration_s : float, default 5.0
             Length of the runs, s, above 1.
 
@@ -443,7 +466,7 @@ class Tuned:
 
 
 def _candidate(row: dict[str, Any], file: str | None) -> Candidate:
-    score, verdict, standing = row["score"], row["verdict"], row["standing"]
+    score, verdict, outcome = row["score"], row["verdict"], row["outcome"]
     return Candidate(
         name=row["name"],
         gains=dict(row["gains"]),
@@ -455,8 +478,8 @@ def _candidate(row: dict[str, Any], file: str | None) -> Candidate:
         runs=score["runs"],
         runs_with_sticks=score["runs_with_sticks"],
         error_bound_rad=verdict.get("error_rad"),
-        standing=standing["is"],
-        why=standing.get("why", ""),
+        outcome=outcome["is"],
+        why=outcome.get("why", ""),
         scenario=None if file is None else Scenario.from_toml(file),
     )
 
@@ -464,7 +487,7 @@ def _candidate(row: dict[str, Any], file: str | None) -> Candidate:
 def tune(
     scenario: ScenarioLike,
     *,
-    identified: Identified | None = None,
+    identified: Identified | str | os.PathLike[str] | None = None,
     rates_deg_s: Iterable[float] | None = None,
     candidates: int = 32,
     uncertified: bool = False,
@@ -477,9 +500,9 @@ def tune(
     scenario : Scenario, str or path
         A scenario of the rig. On a ramp smooth means without sticks, and a certificate is looked for; along another
         path, which may rest and turn round, the error counts, and `uncertified` is needed.
-    identified : Identified, optional
-        The findings of :func:`clutch.identify`; default: the scenario's model and bounds, with its rig's delay and
-        ripple.
+    identified : Identified, str or path, optional
+        The findings of :func:`clutch.identify`, or a file of them as ``clutch identify --out`` writes it; default:
+        the scenario's model and bounds, with its rig's delay and ripple.
     rates_deg_s : iterable of float, optional
         Rates of the ramp at which it is to be smooth, °/s; default: the scenario's own.
     candidates : int, default 32
@@ -498,6 +521,8 @@ def tune(
     ------
     ParamError
         Rates for a path that is no ramp, a rig with brake and motor on one signal, or a value out of range.
+    ValueError
+        A file that holds no findings, or findings without a parameter that a rig file needs; no rates.
     OSError
         The file cannot be read.
 
@@ -509,6 +534,8 @@ def tune(
     0
     """
     checked = as_scenario(scenario, overrides)
-    file = None if identified is None else identified.to_toml()
-    rates = [] if rates_deg_s is None else [float(rate) for rate in rates_deg_s]
+    file = None if identified is None else _rig_file(identified)
+    rates = [float(rate) for rate in _several("rates_deg_s", rates_deg_s, "rates")]
+    if rates_deg_s is not None and not rates:
+        raise ValueError("rates_deg_s: expected at least one rate, or None for the scenario's own")
     return Tuned(_clutch.tune(checked._native, file, rates, candidates, uncertified))

@@ -20,6 +20,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
@@ -432,9 +433,10 @@ def stribeck(friction: StribeckFriction, *, velocity_rad_s: ArrayLike | None = N
 def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
     """Draw the rate of the error over the error, with the samples at which the shaft was stuck.
 
-    Both are the true ones, which the law sees only through the encoder. Under sliding mode the surface,
-    ``σ = f e + ė = 0``, is the dashed line, and the law's layer, ``|σ| ≤ boundary_rad_s``, is shaded. A run
-    of more than 20 000 samples is drawn whole, as an image within the figure.
+    Both are the true ones, which the law sees only through the encoder. The sliding surface of law or shell,
+    ``σ = f e + ė = 0``, is the dashed line, if it has one, and the layer around it, that of ``certificate().layer``, is
+    shaded; a PD's is where its output ends. A run of more than 20 000 samples is drawn whole, as an image within the
+    figure.
 
     Parameters
     ----------
@@ -468,15 +470,15 @@ def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
     if stuck.any():
         dots: dict[str, Any] = {"marker": ".", "markersize": 2.5, "markeredgewidth": 0, "linestyle": "none"}
         ax.plot(error[stuck], rate[stuck], color=_RED, label="stuck", zorder=3, rasterized=many, **dots)
-    law = result.scenario.law
-    slope, boundary = (getattr(law, name, None) for name in ("slope_1_s", "boundary_rad_s"))
-    if slope is not None:
+    surface = result.scenario._native.surface()
+    if surface is not None:
+        slope, boundary = surface
         x, y = np.array(ax.get_xlim()), ax.get_ylim()
-        surface = -slope * x
-        ax.plot(x, surface, color="0.2", linestyle=_LONG_DASHES, label="σ = 0", zorder=3)
-        if boundary is not None:
+        middle = -slope * x
+        ax.plot(x, middle, color="0.2", linestyle=_LONG_DASHES, label="σ = 0", zorder=3)
+        if boundary > 0:
             layer = np.degrees(boundary)
-            edges = (surface - layer, surface + layer)
+            edges = (middle - layer, middle + layer)
             words = f"|σ| ≤ {boundary:g} rad/s"
             ax.fill_between(x, *edges, color="0.92", linewidth=0, label=words, zorder=0)
             for edge in edges:
@@ -671,13 +673,31 @@ def sweep_map(
     mesh = ax.pcolormesh(x_edges, y_edges, means(value, factor), cmap="cividis", **rim)
     bar = _figure(ax).colorbar(mesh, ax=ax, label=label, pad=0.03)
     bar.ax.spines["outline"].set_visible(False)
-    if len(wanted) > 3 and min(shape) > 1:
+    # Between words there is nothing.
+    if len(wanted) > 3 and min(shape) > 1 and xs.dtype.kind == ys.dtype.kind == "f":
         _contours(ax, x_at, y_at, wanted[3], means)
     for axis, words in ((ax.xaxis, xs), (ax.yaxis, ys)):
         if words.dtype.kind != "f":
-            axis.set_ticks(range(len(words)), list(words))
+            axis.set_ticks(range(len(words)), _short(list(words)))
     ax.set(xlabel=_label(x), ylabel=_label(y))
     return ax
+
+
+def _short(words: list[str]) -> list[str]:
+    """Words of an axis; of alternatives with parameters, as laws, the name and what differs among those of a name."""
+    parsed = []
+    for word in words:
+        try:
+            ((name, rows),) = json.loads(word).items()
+            parsed.append((name, dict(rows)))
+        except (ValueError, TypeError, AttributeError):
+            return words
+    short = []
+    for name, rows in parsed:
+        alike = [other for own, other in parsed if own == name]
+        differs = [key for key in rows if any(other.get(key) != rows[key] for other in alike)]
+        short.append("\n".join([name, *(f"{key} {rows[key]}" for key in differs)]))
+    return short
 
 
 def _contours(ax: Axes, x: NDArray[Any], y: NDArray[Any], name: str, means: Callable[..., Any]) -> None:
@@ -705,9 +725,10 @@ def certificate_region(
 ) -> Axes:
     """Draw the gains that are certified for every plant within the bounds, and the scenario's own.
 
-    ``scenario.override(…).certificate().certified`` is evaluated for each pair of the gains given, so the border is
-    known to half a step. By default the gains lie around the required ones and the scenario's own, 17 by 17, and more
-    are evaluated along the border, down to 1/256 of an axis; a region narrower than 1/16 of it may be missed.
+    ``scenario.override(…).certificate().certified_continuous_time`` is evaluated for each pair of the gains
+    given, so the border is known to half a step. By default the gains lie around the required ones and the scenario's
+    own, 17 by 17, and more are evaluated along the border, down to 1/256 of an axis; a region narrower than 1/16 of it
+    may be missed.
 
     Parameters
     ----------
@@ -753,7 +774,7 @@ def certificate_region(
         )
 
     def certified(p: float, d: float) -> bool:
-        return scenario.override({keys[0]: p, keys[1]: d}).certificate().certified
+        return scenario.override({keys[0]: p, keys[1]: d}).certificate().certified_continuous_time
 
     if kp is None and kd is None:
         gains = _around(scenario, own)
@@ -776,7 +797,7 @@ def certificate_region(
         if not region.all():
             ax.contour(*gains, region, levels=[0.5], colors=[_BLUE], linewidths=0.7)
     named = ", ".join(f"{gain:g} {split(key)[1]}" for gain, key in zip(own, keys, strict=True))
-    good = scenario.certificate().certified
+    good = scenario.certificate().certified_continuous_time
     (dot,) = ax.plot(
         *([gain] for gain in own),
         marker="o",

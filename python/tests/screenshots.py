@@ -25,7 +25,7 @@ SCHEMES = ("light", "dark")
 TERMINAL = (80, 24)
 #: A kept picture is at most so large.
 MOST_BYTES = 100_000
-#: What each view has to have before its picture is taken.
+#: Parts that each view has to have before its picture is taken.
 FULL = "typeof data == 'object' && data.t.length && data.t[data.t.length - 1] > 21 && !dirty"
 ANSWERED = "document.body?.dataset.answers && !busy && waiting === null"
 DRAWN = "document.readyState == 'complete' && document.querySelector('svg, pre') !== null"

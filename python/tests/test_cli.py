@@ -74,7 +74,7 @@ def test_json_is_alone_on_standard_output_and_nothing_is_on_standard_error(clutc
     summary = json.loads(done.stdout)
     assert {"scenario", "version", "engine", "seed", "metrics"} <= summary.keys()
     done = clutch("certify", "smc_2", "--json")
-    assert done.stderr == "" and json.loads(done.stdout)["certified"] is True
+    assert done.stderr == "" and json.loads(done.stdout)["certified_continuous_time"] is True
 
 
 @pytest.mark.parametrize("scenario", ["pd_2", "bench_smc_2"])
@@ -104,7 +104,7 @@ def test_certify_exits_0_for_certified_gains_and_2_for_gains_that_are_not(clutch
     clutch("certify", "smc_2", code=0)
     weak = clutch("certify", "smc_2", "--json", "--set", "law.smc.kp_v=2", code=2)
     answer = json.loads(weak.stdout)
-    assert answer["certified"] is False and answer["reason"]
+    assert answer["certified_continuous_time"] is False and answer["reason"]
     assert weak.stderr == ""
 
 

@@ -51,6 +51,11 @@ def test_chunks_of_any_size_on_threads_give_the_same_bits(base, local, chunk):
         same(local, clutch.sweep(base, SAMPLES, executor=pool, chunk=chunk, **OPTIONS))
 
 
+def test_what_is_no_executor_is_refused(base):
+    with pytest.raises(TypeError, match=r"executor is of type object: expected one with submit\(function"):
+        clutch.sweep(base, SAMPLES, executor=object(), **OPTIONS)
+
+
 @pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
 def test_processes_give_the_same_bits(base, local, method):
     context = multiprocessing.get_context(method)

@@ -5,7 +5,18 @@ import os
 import numpy as np
 import pytest
 
-from intervals import BRISTLES, ENGINES, KINDS, beyond, compare, draw, on_bristles, reference, reference_on_bristles
+from intervals import (
+    BRISTLES,
+    ENGINES,
+    KINDS,
+    beyond,
+    compare,
+    draw,
+    on_bristles,
+    reference,
+    reference_on_bristles,
+    with_exponent,
+)
 
 PROGRAM = os.environ.get("CLUTCH_INTERVALS")
 built = pytest.mark.skipif(
@@ -30,6 +41,19 @@ def test_an_engine_ends_where_scipy_does(engine, drawn):
         assert beyond(engine, kind, row) is None
         # A stiff layer takes an explicit pair more steps than it allows itself: it says so.
         assert row["refused"] <= (4 if extreme and engine != "exact_flow" else 0), kind
+        assert len(row["errors"]) > 10, kind
+
+
+@built
+@pytest.mark.parametrize("engine", ENGINES[1:])
+def test_an_engine_ends_where_scipy_does_with_any_stribeck_exponent(engine):
+    rng = np.random.default_rng(9)
+    cases = [with_exponent(rng, draw(rng, extreme=False)) for _ in range(100)]
+    found = compare(PROGRAM, engine, cases, [reference(case) for case in cases])
+    assert set(found) == set(KINDS)
+    for kind, row in found.items():
+        assert beyond(f"{engine}, δ", kind, row) is None
+        assert row["refused"] == 0, kind
         assert len(row["errors"]) > 10, kind
 
 

@@ -118,7 +118,12 @@ def test_a_log_names_the_foreign_law_and_its_replay_takes_it(tmp_path):
     path = tmp_path / "own.mcap"
     clutch.simulate("pd_2", law=OwnPd, overrides=SHORT | {"sampling.scalar": "f32"}).save(path)
     log = clutch.read_log(path)
-    assert log.metadata["foreign_law"].endswith("OwnPd")
+    assert log.metadata["foreign_law"].endswith("OwnPd") and "as_sampled" not in log.metadata
+    # Verdicts are those of a law of clutch.
+    clutch.simulate("pd_2", overrides=SHORT).save(tmp_path / "plain.mcap")
+    told = clutch.read_log(tmp_path / "plain.mcap").metadata
+    assert told["certified_continuous_time"] == "true" and "uncertified" in told["as_sampled"]
+    assert "spectral radius" in told["linear_stability"] and told["sticks"].startswith("not excluded")
     with pytest.raises(ValueError, match="OwnPd"):
         clutch.replay(log)
     assert clutch.replay(log, law=OwnPd).identical

@@ -967,7 +967,7 @@ def test_a_motor_that_is_too_weak_is_told_what_takes_most_of_it():
     with pytest.raises(clutch.ParamError) as loaded:
         motor.override(hung)
     assert "hang less on it" in str(loaded.value) and "preload" not in str(loaded.value)
-    # What it needs at most on its way suffices.
+    # The most that it needs on its way suffices.
     most = float(
         re.search(r"up to (-[0-9.]+) V later, .* lower output.lowest_v and rig.dac.lowest_v", str(loaded.value))[1]
     )
@@ -1101,14 +1101,14 @@ def test_a_certificate_says_what_the_command_prints(request):
         certificate = clutch.Scenario.load(name).certificate()
         assert json.loads(json.dumps(dataclasses.asdict(certificate))) == printed, name
         assert bool(certificate) == (done.returncode == 0)
-        assert certificate.certified or not certificate
+        assert certificate.certified_continuous_time or not certificate
 
 
 def test_a_certificate_comes_back_from_repr_pickle_and_replace():
     for name in ["smc_2", "ctc_2", "bench_smc_2"]:
         certificate = clutch.Scenario.load(name).certificate()
         assert_nothing_is_lost(certificate)
-        assert not certificate.replace(certified=False)
+        assert not certificate.replace(certified_continuous_time=False)
         assert certificate.replace(law="mine") != certificate
 
 
@@ -1130,7 +1130,7 @@ def test_the_error_of_the_sampled_loop_is_bounded_as_by_the_command(request, tmp
         scenario.override({"law.pd.kp_v_rad": 4000}).certificate(check=saved)
     # Certified in continuous time, and unstable as sampled.
     unstable = clutch.Scenario.load("bench_pd_2").certificate(sampled=True, save=tmp_path / "none.json")
-    assert unstable.certified
+    assert unstable.certified_continuous_time
     assert not unstable
     assert "unstable" in unstable.sampled.reason
     assert not (tmp_path / "none.json").exists()

@@ -196,7 +196,7 @@ def test_the_lesson_says_what_is_to_be_seen(page):
         assert page.run("document.querySelectorAll('#steps button[aria-pressed=true]').length") == 1
         figures.append(shown(page))
     cycles = [{law: m["stick_slip_cycles_per_s"] for law, m in step.items()} for step in figures]
-    pd, pid, smc, glide = "bench_pd_2", "pid_2", "bench_smc_2", "bench_glide_2"
+    pd, pid, smc, glide = "bench_pd_2", "bench_pid_2", "bench_smc_2", "bench_glide_2"
     assert 38 < cycles[0][pd] < 43  # some forty times a second
     assert list(cycles[0]) == [pd]
     assert cycles[1][smc] < cycles[1][pd] / 3

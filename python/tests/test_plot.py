@@ -268,7 +268,10 @@ def test_the_phase_plane_marks_the_stuck_samples_and_the_layer(smc, tmp_path):
 
 
 def test_only_a_law_with_a_surface_gets_one(pd):
-    assert names(plot.phase_plane(pd)) == ["path", "stuck"]
+    # The law's own word, and no key of it: PD's is where its output ends, and an integral's is no line here.
+    assert "σ = 0" in names(plot.phase_plane(pd))
+    for law in ("pid", "smc_integral", "glide"):
+        assert "σ = 0" not in names(plot.phase_plane(simulate("smc_2", overrides={**SHORT, "law": {law: {}}})))
     sign = simulate("smc_2", overrides={**SHORT, "law": {"smc_sign": {}}})
     assert "σ = 0" in names(plot.phase_plane(sign)) and not any("≤" in name for name in names(plot.phase_plane(sign)))
 
@@ -374,6 +377,17 @@ def test_choices_are_an_axis_of_words():
     assert np.degrees([[1.0, 2.0], [3.0, 4.0]]) == pytest.approx(mesh(ax).get_array())
 
 
+def test_alternatives_are_told_by_their_names_and_what_differs():
+    laws = [
+        '{"pd": {"kp_v_rad": 5.0}}',
+        '{"smc": {"kp_v": 3.0, "slope_1_s": 70.0}}',
+        '{"smc": {"kp_v": 4.0, "slope_1_s": 70.0}}',
+    ]
+    table = Table({"law": laws * 2, "run.seed": [1, 1, 1, 2, 2, 2], "rms_error_rad": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]})
+    ax = plot.sweep_map(table, "law", "run.seed", "rms_error_rad")
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["pd", "smc\nkp_v 3.0", "smc\nkp_v 4.0"]
+
+
 def test_a_data_frame_draws_as_its_table_does(gains):
     keys = ("law.smc.kp_v", "law.smc.boundary_rad_s", "rms_error_rad")
     one, other = plot.sweep_map(gains.table, *keys), plot.sweep_map(gains.to_pandas(), *keys)
@@ -467,7 +481,7 @@ def test_the_region_is_where_the_certificate_says_so(tmp_path):
     for kp in (2.0, 2.2, 2.3, 2.5, 3.0, 5.0):
         for kd in (3.0, 5.5, 6.0, 20.0, 400.0):
             asked = scenario.override({"law.smc.kp_v": kp, "law.smc.kd_v_s_rad": kd}).certificate()
-            assert region(ax, kp, kd) == asked.certified, (kp, kd)
+            assert region(ax, kp, kd) == asked.certified_continuous_time, (kp, kd)
     dot = line(ax, "3 V, 400 V s/rad: certified")
     assert (list(dot.get_xdata()), list(dot.get_ydata())) == ([3.0], [400.0])
 
@@ -494,8 +508,8 @@ def test_the_region_of_ctc_is_where_its_certificate_says_so(tmp_path):
     for kp in (6.0, 30.0, 100.0, 1000.0, 1900.0):
         for kd in (0.04, 0.3, 0.7, 3.0, 13.0):
             asked = scenario.override({"law.ctc.kp_1_s2": kp, "law.ctc.kd_1_s": kd}).certificate()
-            assert region(ax, kp, kd) == asked.certified, (kp, kd)
-            seen.add(asked.certified)
+            assert region(ax, kp, kd) == asked.certified_continuous_time, (kp, kd)
+            seen.add(asked.certified_continuous_time)
     assert seen == {True, False}
 
 

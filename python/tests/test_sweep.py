@@ -52,7 +52,7 @@ def assert_rows_are_single_runs(base, result):
         figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["row"][i]], strict=True)))
         for name in FIGURES:
             np.testing.assert_array_equal(result.table[name][i], figures[name], err_msg=f"row {i}: {name}")
-        assert result.table["certified_continuous_time"][i] == run.scenario.certificate().certified
+        assert result.table["certified_continuous_time"][i] == run.scenario.certificate().certified_continuous_time
 
 
 # --- Rows to run -------------------------------------------------------------------------------
@@ -202,6 +202,13 @@ def test_a_refused_row_is_named_with_its_key_value_and_number(short):
     assert caught.value.field == "law.smc.kp_w"
 
 
+def test_what_is_no_table_and_a_row_without_a_value_are_named(short):
+    with pytest.raises(TypeError, match="parameters is of type list: expected a dict of sequences, a table"):
+        clutch.sweep(short, [{"law.smc.kp_v": 3.0}])
+    with pytest.raises(TypeError, match=r"law\.smc\.kp_v: row 1 has no value"):
+        clutch.sweep(short, {"law.smc.kp_v": [3.0, None]})
+
+
 def test_a_refused_row_ends_a_long_sweep_early():
     long = clutch.Scenario.load("smc_2", {"run.duration_s": 500.0})
     done = []
@@ -316,6 +323,11 @@ INTERRUPTED = """
 """
 
 
+# Far below what is left of these sweeps: 15 s, or of long runs, of which none ends within 5 s, days. Far above the 0.01
+# to 0.1 s in which they answer, which become 0.3 s on a busy machine.
+AT_ONCE_S = 2.0
+
+
 def interrupted(duration, setup="", when="runs.wait(30); time.sleep(0.2)"):
     """Seconds from Ctrl-C to the answer, and finished runs; the median of three processes."""
     found = []
@@ -328,21 +340,21 @@ def interrupted(duration, setup="", when="runs.wait(30); time.sleep(0.2)"):
     return sorted(found)[1]
 
 
-def test_ctrl_c_gives_the_finished_part_within_a_fifth_of_a_second():
+def test_ctrl_c_gives_the_finished_part_at_once():
     seconds, runs = interrupted(2.0)
-    assert runs > 0 and seconds < 0.2
+    assert runs > 0 and seconds < AT_ONCE_S
 
 
 def test_ctrl_c_ends_also_a_single_long_run():
     # No run ends that would say that they have begun: what takes long on a busy machine is done before.
     seconds, runs = interrupted(9_000.0, setup="import numpy", when="time.sleep(1.0)")
-    assert runs == 0 and seconds < 0.2
+    assert runs == 0 and seconds < AT_ONCE_S
 
 
 def test_ctrl_c_gives_the_chunks_that_threads_have_finished():
     setup = "from concurrent.futures import ThreadPoolExecutor; executor = ThreadPoolExecutor(2)"
     seconds, runs = interrupted(1.5, setup)
-    assert runs > 0 and runs % 20 == 0 and seconds < 0.5
+    assert runs > 0 and runs % 20 == 0 and seconds < AT_ONCE_S
 
 
 def test_an_interrupted_grid_has_gaps_where_nothing_ran(short):

@@ -83,6 +83,8 @@ def test_a_file_of_another_sweep_is_refused_and_stays(short, tmp_path, change, m
     with pytest.raises(ValueError, match="is not what this sweep gives"):
         clutch.sweep_to_file(out, other, parameters, resume=True)
     assert out.read_bytes() == before
+    with pytest.raises(ValueError, match=r"rows\.xlsx: expected a name that ends with \.csv or \.parquet"):
+        clutch.sweep_to_file(tmp_path / "rows.xlsx", short, parameters)
     (tmp_path / "none.csv").write_bytes(b"")
     with pytest.raises(ValueError, match="no header"):
         clutch.sweep_to_file(tmp_path / "none.csv", short, parameters, resume=True)
@@ -119,6 +121,8 @@ def test_parquet_has_the_rows_their_kinds_and_units(short, tmp_path):
     assert [x for x in found if x is not None] == [x for x in expected.table["max_error_rad"] if x == x]
     assert table.column("certified_continuous_time").to_pylist()[0] is True
     assert table.schema.field("max_error_rad").metadata[b"units"] == b"rad"
+    for told in [table.schema.metadata, expected.to_arrow().schema.metadata]:
+        assert clutch.Scenario.from_toml(told[b"scenario.toml"].decode()) == short and told[b"version"]
     with pytest.raises(FileExistsError):
         clutch.sweep_to_file(out, short, choices)
 

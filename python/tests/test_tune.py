@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -39,7 +40,7 @@ def test_identification_is_the_commands_and_holds_the_truth(rig):
         assert rig.refused[key] == row["refused"] if "refused" in row else vars(rig.parameters[key]) == row
     assert rig.parameters["pull_rad_s2"].holds(0.047088 / 0.0017)
     assert not rig.parameters["pull_rad_s2"].holds(20)
-    assert "mass" in rig.refused["each"]
+    assert "mass" in rig.refused["each"] and rig.ripple_waves_per_turn == told["ripple_waves_per_turn"]
     assert "[bounds]" in rig.to_toml()
 
 
@@ -53,14 +54,25 @@ def test_a_motor_axis_is_identified_within_its_limits():
     assert "known torque" in axis.refused["each"] and "[model.actuator.motor]" in axis.to_toml()
     left, right = axis.plot().axes
     assert len(left.get_yticklabels()) == len(told) and len(right.lines) == 1
-    with pytest.raises(ValueError, match="travel = 3 °: expected 10 to 3600 °"):
+    with pytest.raises(ValueError, match="travel_deg = 3 °: expected 10 to 3600 °"):
         clutch.identify("motor_pid", travel_deg=3)
-    with pytest.raises(ValueError, match="travel: is a limit"):
+    with pytest.raises(ValueError, match="travel_deg: is a limit"):
         clutch.identify("board_smc_2", travel_deg=30)
-    with pytest.raises(ValueError, match="fastest = 61 °/s: expected 5 to 60 °/s"):
+    with pytest.raises(ValueError, match="fastest_deg_s = 61 °/s: expected 5 to 60 °/s"):
         clutch.identify("board_smc_2", fastest_deg_s=61)
     with pytest.raises(ValueError, match="logs: expected at least one log"):
         clutch.identify("board_smc_2", logs=[])
+
+
+@pytest.mark.parametrize(
+    ("scenario", "limit"),
+    [("board_smc_2", "fastest_deg_s"), ("motor_pid", "fastest_deg_s"), ("motor_pid", "travel_deg")],
+)
+def test_the_documented_limits_of_an_experiment_are_those_that_refuse(scenario, limit):
+    with pytest.raises(ValueError, match=f"{limit} = 1 °.*: expected ") as refused:
+        clutch.identify(scenario, **{limit: 1})
+    told = str(refused.value).partition("expected ")[2].replace(" °", "°" if limit == "travel_deg" else " °")
+    assert told in clutch.identify.__doc__, told
 
 
 def test_a_known_mass_tells_torque_and_inertia_one_by_one(tmp_path):
@@ -98,10 +110,30 @@ def test_tuning_is_the_commands(rig, tuned, tmp_path):
     assert [c.name for c in tuned.candidates] == [c["name"] for c in told["candidates"]]
     assert [c.cost for c in tuned.candidates] == [c["score"]["cost"] for c in told["candidates"]]
     assert tuned.winner is tuned.candidates[told["chosen"]]
+    again = clutch.tune("board_smc_2", identified=file, candidates=2)
+    assert [c.cost for c in again.candidates] == [c.cost for c in tuned.candidates]
+
+
+def test_lists_and_rig_files_are_told_from_what_is_none(tmp_path):
+    for wrong, said in [
+        (lambda: clutch.identify(logs="a.mcap"), "logs = 'a.mcap': expected a list of paths"),
+        (lambda: clutch.identify(logs=["a"], loaded="b"), "loaded = 'b': expected a list of paths"),
+        (lambda: clutch.tune("board_smc_2", rates_deg_s="2"), "rates_deg_s = '2': expected a list of rates"),
+        (lambda: clutch.tune("board_smc_2", rates_deg_s=2.0), "rates_deg_s = 2.0: expected a list of rates"),
+    ]:
+        with pytest.raises(TypeError, match=re.escape(said)):
+            wrong()
+    with pytest.raises(ValueError, match="rates_deg_s: expected at least one rate"):
+        clutch.tune("board_smc_2", rates_deg_s=[])
+    file = tmp_path / "other.toml"
+    for content, said in [(b"[run]\n", "has no table [model]"), (b"\xff", "expected a text in UTF-8")]:
+        file.write_bytes(content)
+        with pytest.raises(ValueError, match=re.escape(f"{file}: {said}")):
+            clutch.tune("board_smc_2", identified=file)
 
 
 def test_what_is_given_out_slides_is_proven_and_runs(tuned, tmp_path):
-    assert tuned.winner.standing == "chosen" and tuned.winner.runs_with_sticks == 0
+    assert tuned.winner.outcome == "chosen" and tuned.winner.runs_with_sticks == 0
     assert "|e| stays below" in tuned.verdict
     result = clutch.simulate(tuned.scenario, overrides={"run.seed": 999, "run.duration_s": 3.0})
     assert result.metrics.stick_slip_cycles_per_s == 0
@@ -109,7 +141,7 @@ def test_what_is_given_out_slides_is_proven_and_runs(tuned, tmp_path):
     tuned.save_proof(tmp_path / "proof.json")
     assert json.loads((tmp_path / "proof.json").read_text())["setup"]["delay_ticks"] == 0
     table = tuned.to_pandas()
-    assert table.loc[tuned.winner.name, "standing"] == "chosen"
+    assert table.loc[tuned.winner.name, "outcome"] == "chosen"
 
 
 def test_pictures_have_what_they_say(rig, tuned):
@@ -168,13 +200,13 @@ def test_ctrl_c_ends_a_search_for_gains_or_for_a_proof_at_once(tmp_path):
     saved = tmp_path / "proof.json"
     wide = clutch.Scenario.load("pd_2").override({"bounds.friction_percent": 40})
     for work in [
-        lambda: clutch.tune("board_smc_2", candidates=3000),
+        lambda: clutch.tune("board_smc_2", candidates=10_000),
         lambda: wide.certificate(sampled=True, save=saved),
     ]:
         threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
         begun = time.monotonic()
         with pytest.raises(KeyboardInterrupt):
             work()
-        # Alone they take many times as long.
-        assert time.monotonic() - begun < 5
+        # Alone they take 30 s and more; a busy machine answers in 7.
+        assert time.monotonic() - begun < 20
     assert not saved.exists()

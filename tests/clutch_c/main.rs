@@ -130,4 +130,6 @@ fn settings_of_gains_that_are_not_certified_are_printed_on_request_only() {
     );
     let odd = header(&["--name", "2run"]);
     assert!(String::from_utf8_lossy(&odd.stderr).contains("--name 2run: expected a name of C"));
+    let taken = header(&["--name", "int"]);
+    assert!(String::from_utf8_lossy(&taken.stderr).contains("--name int: is a word of C or C++ itself"));
 }

@@ -110,16 +110,17 @@ fn kills(count: usize, latest: f64, folder: &Path, prepare: impl Fn(&mut Command
             let silent = board.wait_for(from, "after the last code").text;
             let _ = board.wait_for(from, "client left");
             let silent: f64 = silent.split_whitespace().next().and_then(|ms| ms.parse().ok()).expect("ms");
+            // The board faulted before the kill: the machine held the controller up. One that faults as a code comes, which
+            // was late, did not hear silence either, though its line may have come after the kill.
+            let reached = safe.seen.saturating_duration_since(killed);
+            if safe.seen < killed || silent == 0.0 {
+                return Err("the board had faulted before the kill".to_owned());
+            }
             // By the board's clock: time from the last code to the safe output.
             assert!(
                 silent <= WATCHDOG_S * 1e3 + 0.001 && silent > 0.0,
                 "{what}: the board took {silent} ms after the last code"
             );
-            // The board faulted before it was killed: the machine held the controller up.
-            let reached = safe.seen.saturating_duration_since(killed);
-            if safe.seen < killed {
-                return Err("the watchdog had gone off before the kill".to_owned());
-            }
 
             let cut = read_log(&log);
             assert!(!cut.complete, "{what}: a log that was cut must not look finished");

@@ -129,5 +129,5 @@ fn a_drift_is_told_on_standard_error_and_ends_the_run_on_request() {
     let _ = run(&["replay", log]).expect(0).prints(&["identical over ", told]);
     let wide = ["replay", log, "--set", "bounds.friction_percent=40"];
     assert!(!run(&wide).expect(0).prints(&["bounds 0.6 to 1.4"]).out.contains("DRIFT"));
-    let _ = run(&["loop", "--on-drift", "perhaps"]).expect(64).says(&["--on-drift", "tell, stop"]);
+    let _ = run(&["loop", "--on-drift", "perhaps"]).expect(64).says(&["--on-drift", "report, stop"]);
 }

@@ -233,5 +233,7 @@ fn a_loop_arms_on_its_own_certificate_and_on_no_other() {
 fn a_scenario_without_a_safe_state_is_not_run() {
     let _guard = beside_others();
     let _ = run(&["loop", "smc_2"]).expect(1).says(&["safety"]);
+    let _ =
+        run(&["loop", "board_smc_2", "--duration", "-1"]).expect(1).says(&["run.duration_s = -1: expected"]);
     let _ = run(&["daq", "smc_2"]).expect(1).says(&["safety"]);
 }

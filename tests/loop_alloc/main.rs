@@ -144,7 +144,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         realtime: RealtimeOptions { thread_priority: 0, lock_memory: false, ..RealtimeOptions::default() },
         pace,
         settle: 0.5,
-        on_drift: OnDrift::Tell,
+        on_drift: OnDrift::Report,
         hooks: (|| INSIDE.set(true), || INSIDE.set(false)),
     };
     for counter in [&TAKEN, &GIVEN_BACK, &SIZE] {

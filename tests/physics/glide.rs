@@ -1,7 +1,9 @@
 //! Glide on the rig `bench`: smooth where the paper's laws stick, with one belief and one set of gains. The whole table is in
 //! docs/smooth.md; these are its first rows, with fewer discs.
 
-use clutch_sim::{Metrics, Scenario};
+use clutch_core::law::Limit;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::{Keep, Metrics, Scenario};
 use toml::Value;
 
 /// The built-in scenario.
@@ -20,7 +22,7 @@ fn discs_of(base: &toml::Table, first: i64, n: i64, keys: &[(&str, Value)]) -> V
         let mut set = vec![("run.seed".to_owned(), Value::Integer(seed))];
         set.extend(keys.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
         let scenario = Scenario::from_table("glide", base.clone(), &set).unwrap();
-        scenario.run(clutch_sim::Keep::Figures, clutch_sim::progress::UNWATCHED).unwrap().metrics
+        scenario.run(Keep::Figures, UNWATCHED).unwrap().metrics
     };
     (first..first + n).map(run).collect()
 }
@@ -166,7 +168,7 @@ fn two_moves(keys: &[(&str, Value)], seed: i64) -> clutch_sim::Run {
     ];
     set.extend(keys.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
     let scenario = Scenario::from_table("glide", table, &set).unwrap();
-    scenario.run(clutch_sim::Keep::Trace, clutch_sim::progress::UNWATCHED).unwrap()
+    scenario.run(Keep::Trace, UNWATCHED).unwrap()
 }
 
 #[test]
@@ -196,5 +198,33 @@ fn a_path_that_comes_to_rest_is_held_and_left_again() {
             let at = trace.error.iter().position(|e| e.abs() == run.metrics.max_error_rad).unwrap();
             assert!(error < 0.2, "disc {seed}: {error}° at {} s, {} rows", trace.time[at], keys.len());
         }
+    }
+}
+
+/// Under a fine encoder an edge comes in nearly every period of a motion, and none around a reversal: no number ends there.
+#[test]
+fn a_reversal_under_a_fine_encoder_leaves_every_number_finite() {
+    let text = Scenario::text("motor_glide".as_ref()).unwrap().1;
+    for (stribeck, scalar, steps) in
+        [("0.001", "f64", "0.95"), ("0.01", "f32", "0.95"), ("0.01", "f64", "0.0"), ("0.001", "f32", "0.0")]
+    {
+        let set = [
+            ("rig.encoder.counts_per_rev", "200000"),
+            ("rig.friction.stribeck.stribeck_velocity_rad_s", stribeck),
+            ("law.glide.micro_below_deg_s", steps),
+            ("sampling.scalar", scalar),
+            ("run.duration_s", "12.0"),
+        ];
+        let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let run = Scenario::parse("motor", &text, &set).unwrap().run(Keep::Trace, UNWATCHED).unwrap();
+        let finite = |xs: &[f64]| xs.iter().all(|x| x.is_finite());
+        let trace = &run.trace;
+        assert!(finite(&trace.demand) && finite(&trace.error_rate), "{stribeck}, {scalar}, {steps}");
+        for (name, values) in &trace.terms {
+            assert!(finite(values), "{name}: {stribeck}, {scalar}, {steps}");
+        }
+        // It does turn round, and not one demand was refused as no number.
+        assert!(trace.target_velocity.iter().any(|v| *v < 0.0));
+        assert!(!trace.limit.contains(&Limit::Invalid), "{stribeck}, {scalar}, {steps}");
     }
 }

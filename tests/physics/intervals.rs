@@ -283,6 +283,24 @@ proptest! {
         prop_assert!(speed < tolerance * fastest, "{} rad/s apart", speed);
     }
 
+    /// A brake resists either way alike: with the torque turned round the shaft does the same the other way.
+    #[test]
+    fn a_mirrored_shaft_moves_as_in_a_mirror(
+        velocity in -3.0_f64..3.0, volts in 0.0_f64..10.0, torque in -0.2_f64..0.2, v_s in -6.0_f64..0.0,
+        milliseconds in 1_u32..50,
+    ) {
+        let plant = PlantParams { friction: stribeck(0.2, 0.15, 10.0_f64.powf(v_s)).into(), ..PlantParams::default() };
+        let (one, other) = (Drive::Constant(torque), Drive::Constant(-torque));
+        let seconds = 1e-3 * f64::from(milliseconds);
+        for (name, mut engine) in engines() {
+            let (shaft, _) = moved(engine.as_mut(), &model(&plant), &input(&one, volts, seconds), velocity);
+            let (mirrored, _) = moved(engine.as_mut(), &model(&plant), &input(&other, volts, seconds), -velocity);
+            let (way, speed) = (shaft.position + mirrored.position, shaft.velocity + mirrored.velocity);
+            let fastest = velocity.abs().max(shaft.velocity.abs());
+            prop_assert!(way.abs() <= 1e-9 * fastest * seconds && speed.abs() <= 1e-9 * fastest, "{}", name);
+        }
+    }
+
     /// Torque times way, less what the shaft has gained, went into friction and drag: never below nothing.
     #[test]
     fn no_interval_gains_energy(

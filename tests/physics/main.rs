@@ -6,6 +6,7 @@ mod auto;
 mod bristles;
 mod detector;
 mod draw;
+mod energy;
 mod engines;
 mod errata;
 mod field_laws;

@@ -21,7 +21,7 @@ pub(crate) struct Interval {
 
 impl Interval {
     /// With torque and voltage held if they are to be `constant`; else any drive, lag and disc.
-    fn draw(draw: &mut Draw, friction: FrictionParams, constant: bool) -> Interval {
+    pub(crate) fn draw(draw: &mut Draw, friction: FrictionParams, constant: bool) -> Interval {
         let (seconds, volts) = (draw.log(1e-3, 2e-2), draw.between(0.0, 10.0));
         let (plant, torque) = draw.plant(friction, seconds, volts.max(0.5));
         let drive = if constant {

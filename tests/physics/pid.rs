@@ -4,9 +4,9 @@ use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Metrics, Scenario};
 
 fn metrics(set: &[(&str, String)]) -> Metrics {
-    let text = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "pid_2").unwrap().toml;
+    let text = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_pid_2").unwrap().toml;
     let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
-    Scenario::parse("pid_2", text, &set).unwrap().run(Keep::Figures, UNWATCHED).unwrap().metrics
+    Scenario::parse("bench_pid_2", text, &set).unwrap().run(Keep::Figures, UNWATCHED).unwrap().metrics
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::smooth_speed::{
-    Axis, Cause, Failing, SmoothSpeed, Trials, gain_map, lowest_smooth_speed, rate_map,
+    Axis, Failing, SmoothSpeed, Trials, Wall, gain_map, lowest_smooth_speed, rate_map,
 };
 use clutch_sim::{Keep, Scenario};
 
@@ -30,18 +30,18 @@ const IDEAL: (&str, &str) = ("rig.encoder.quantised", "false");
 fn an_unstable_sampled_loop_is_the_cause_and_what_makes_it_stable_makes_it_slower() {
     let rates = [2.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0];
     let paper = lowest("bench_pd_2", &[], &rates);
-    assert_eq!((paper.cause, rate(&paper) >= 15.0), (Some(Cause::SampledLoop), true), "{paper:?}");
+    assert_eq!((paper.cause, rate(&paper) >= 15.0), (Some(Wall::SampledLoop), true), "{paper:?}");
     // With the rig's own mean friction: 1.0227.
     assert!((paper.evidence.spectral_radius.unwrap() - 1.0227).abs() < 1e-4, "{paper:?}");
     for stable in [("velocity.smoothed_derivative.smoothing", "1.0"), ("rig.delay_ticks", "0")] {
         let found = lowest("bench_pd_2", &[stable], &rates);
         assert!(found.evidence.spectral_radius.unwrap() < 1.0, "{stable:?} {found:?}");
-        assert!(rate(&found) <= 8.0 && found.cause != Some(Cause::SampledLoop), "{stable:?} {found:?}");
+        assert!(rate(&found) <= 8.0 && found.cause != Some(Wall::SampledLoop), "{stable:?} {found:?}");
     }
     // The removal of what is no cause takes nothing away: the sticks at 6 and 10 °/s stay.
     for other in [EVEN, IDEAL] {
         let found = lowest("bench_pd_2", &[other], &rates);
-        assert!(rate(&found) > 10.0 && found.cause == Some(Cause::SampledLoop), "{other:?} {found:?}");
+        assert!(rate(&found) > 10.0 && found.cause == Some(Wall::SampledLoop), "{other:?} {found:?}");
     }
 }
 
@@ -63,11 +63,11 @@ const PURE: [(&str, &str); 9] = [
 fn the_stribeck_edge_is_where_the_closed_form_has_it() {
     let rates: Vec<f64> = (1..=40).map(|i| f64::from(i) / 10.0).collect();
     let with = |kd, more: &[(&str, &str)]| {
-        lowest("pid_2", &[&PURE[..], &[("law.pid.kd_v_s_rad", kd)], more].concat(), &rates)
+        lowest("bench_pid_2", &[&PURE[..], &[("law.pid.kd_v_s_rad", kd)], more].concat(), &rates)
     };
     let base = with("10.0", &[]);
     let edge = base.evidence.stribeck_edge_deg_s.unwrap();
-    assert_eq!(base.evidence.causes, [Cause::StribeckEdge], "{base:?}");
+    assert_eq!(base.evidence.causes, [Wall::StribeckEdge], "{base:?}");
     assert!((rate(&base) / edge - 1.0).abs() < 0.1, "{edge} {base:?}");
     // v_s ln[(μ_s/μ_d − 1) v_h/(K_d v_s)], of which C_d takes half a percent of the argument.
     let holds: f64 = 0.2094 * 9.81 * 0.024 / (0.104 * 0.14);
@@ -91,7 +91,7 @@ fn the_stribeck_edge_is_where_the_closed_form_has_it() {
 fn the_encoders_edge_goes_with_a_finer_encoder() {
     let with = |counts| lowest("bench_glide_2", &[("rig.encoder.counts_per_rev", counts)], &[0.7, 3.0]);
     let coarse = with("10000");
-    assert_eq!((coarse.rate_deg_s, coarse.cause), (Some(3.0), Some(Cause::EncoderEdge)), "{coarse:?}");
+    assert_eq!((coarse.rate_deg_s, coarse.cause), (Some(3.0), Some(Wall::EncoderEdge)), "{coarse:?}");
     // (Stribeck's 4.0 1/s and the ripple's 39.7 1/s) times 51 ms.
     assert!((coarse.evidence.growth_between_edges.unwrap() - 2.245).abs() < 0.01, "{coarse:?}");
     let fine = with("80000");
@@ -111,14 +111,14 @@ fn the_jolt_of_an_edge_goes_with_the_edge_and_with_the_gain() {
     };
     let (stiff, soft) = (with("38.0", &[]), with("19.0", &[]));
     for found in [&stiff, &soft] {
-        assert_eq!(found.evidence.causes, [Cause::EdgeJolt], "{found:?}");
+        assert_eq!(found.evidence.causes, [Wall::EdgeJolt], "{found:?}");
         let ratio = rate(found) / found.evidence.edge_jolt_deg_s.unwrap();
         assert!((0.7..1.4).contains(&ratio), "{found:?}");
     }
     assert!(rate(&soft) < 0.7 * rate(&stiff), "{soft:?} {stiff:?}");
     let (ideal, even) = (with("38.0", &[IDEAL]), with("38.0", &[EVEN]));
     assert!(rate(&ideal) < 0.4 * rate(&stiff) && ideal.evidence.edge_jolt_deg_s.is_none(), "{ideal:?}");
-    assert!(rate(&even) >= 0.6 * rate(&stiff) && even.cause == Some(Cause::EdgeJolt), "{even:?}");
+    assert!(rate(&even) >= 0.6 * rate(&stiff) && even.cause == Some(Wall::EdgeJolt), "{even:?}");
 }
 
 #[test]
@@ -134,21 +134,21 @@ fn ripple_along_the_disc_is_the_cause_where_an_even_disc_is_smooth() {
     };
     let told = |found: &SmoothSpeed| (found.cause, found.evidence.even_disc_smooth);
     let soft = with("812.3", "7.0", &[]);
-    assert_eq!(told(&soft), (Some(Cause::Ripple), Some(true)), "{soft:?}");
-    assert_eq!(soft.evidence.causes, [Cause::Ripple], "{soft:?}");
+    assert_eq!(told(&soft), (Some(Wall::Ripple), Some(true)), "{soft:?}");
+    assert_eq!(soft.evidence.causes, [Wall::Ripple], "{soft:?}");
     // The less ripple, the slower; on an even disc something else is left.
     let (half, even) = (with("812.3", "7.0", &[("rig.ripple.rms", "0.075")]), with("812.3", "7.0", &[EVEN]));
     assert!(rate(&even) < 0.5 * rate(&soft) && rate(&half) < rate(&soft), "{soft:?} {half:?} {even:?}");
-    assert!(even.cause != Some(Cause::Ripple), "{even:?}");
+    assert!(even.cause != Some(Wall::Ripple), "{even:?}");
     // A finer encoder does not help.
     let fine = with("812.3", "7.0", &[IDEAL]);
-    assert!(rate(&fine) > 0.5 * rate(&soft) && fine.cause == Some(Cause::Ripple), "{fine:?}");
+    assert!(rate(&fine) > 0.5 * rate(&soft) && fine.cause == Some(Wall::Ripple), "{fine:?}");
     // A weakly damped loop sticks on an even disc, too.
     let weak = with("3693.0", "10.0", &[]);
     assert_eq!(told(&weak), (None, Some(false)), "{weak:?}");
     // Where another cause holds, nothing is asked.
     let jolt = with("2000.0", "38.0", &[]);
-    assert_eq!(told(&jolt), (Some(Cause::EdgeJolt), None), "{jolt:?}");
+    assert_eq!(told(&jolt), (Some(Wall::EdgeJolt), None), "{jolt:?}");
 }
 
 #[test]
@@ -252,4 +252,7 @@ fn what_cannot_be_searched_is_refused_by_its_key() {
     assert!(map(kp, "law.pd.kd", &[1.0]).contains("kd_v_s_rad"), "{}", map(kp, "law.pd.kd", &[1.0]));
     assert!(map(kp, kp, &[1.0]).contains("named twice"));
     assert!(map(kp, kd, &[]).contains("at least one value"));
+    for own in ["reference.ramp.rate_deg_s", "run.seed"] {
+        assert!(map(own, kd, &[1.0]).contains("rates and seeds of its own"), "{}", map(own, kd, &[1.0]));
+    }
 }

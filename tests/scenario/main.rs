@@ -47,7 +47,7 @@ fn every_built_in_scenario_is_good_and_runs() {
         let certified = !matches!(
             b.name,
             "ctc_2"
-                | "pid_2"
+                | "bench_pid_2"
                 | "motor_ctc"
                 | "motor_pid"
                 | "motor_pid_coulomb"
@@ -293,6 +293,20 @@ fn a_run_that_does_not_fit_into_memory_is_refused() {
     refuses(with("run.duration_s", "1e5"), "my.toml: run.duration_s = 100000: ", &["10 million"]);
     refuses(with("run.duration_s", "1e300"), "my.toml: run.duration_s = ", &["10 million"]);
     refuses(with("run.duration_s", "inf"), "my.toml: run.duration_s = inf: ", &["finite"]);
+}
+
+/// Such a rig is within every limit: only its motion shows that no step is small enough.
+#[test]
+fn a_rig_out_of_all_proportion_is_told_by_the_key_that_is_farthest_from_its_default() {
+    let set = [("run.engine", "dormand_prince"), ("rig.inertia_kg_m2", "1e-14")];
+    let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let light = Scenario::parse("my.toml", GOOD, &set).unwrap();
+    let why = light.run(Keep::Figures, UNWATCHED).unwrap_err().to_string();
+    assert!(
+        why.starts_with("my.toml: rig.inertia_kg_m2 = 0.00000000000001: the motion after t = 0 s"),
+        "{why}"
+    );
+    assert!(why.ends_with("; this number is the farthest from its default, 0.0017"), "{why}");
 }
 
 #[test]
@@ -561,6 +575,11 @@ fn a_rig_that_no_voltage_keeps_on_its_path_is_told_what_to_change() {
             "pd_2",
             ("rig.drive", "{belt = {stiffness_nm_rad = 0.5, speed_deg_s = -2.0}}"),
             "let rig.drive turn the shaft the path's way",
+        ),
+        (
+            "pd_2",
+            ("rig.drive", "{table = {points_s_nm = [[0.0, 0.00003]]}}"),
+            "let rig.drive turn the shaft with more, or lower rig.viscous_damping_nm_s_rad or the path's rate",
         ),
         (
             "pd_2",

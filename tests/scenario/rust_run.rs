@@ -18,7 +18,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// What the command prints of a scenario; `more` are options.
+/// The text that the command prints of a scenario; `more` are options.
 fn printed(scenario: &Path, more: &[&str]) -> String {
     let mut rust = Command::new(command());
     rust.args(["scenario", "rust"]).arg(scenario);

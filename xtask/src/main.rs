@@ -189,8 +189,9 @@ enum Verb {
     /// Holds the watch over friction and load against rigs that drift and rigs that do not, half an hour: the tables of
     /// docs/loop.md.
     Drift,
-    /// Identifies random rigs, a quarter as many of each kind that is unlike the model, and as many random motor axes, each from
-    /// about a minute of experiment on the simulated board: the tables of docs/identify.md, some minutes.
+    /// Identifies random rigs and as many random motor axes, each from about a minute of experiment on the simulated board; as
+    /// many of both with ripples of other waves, a tenth as many with each of some encoders and periods, and a quarter as many
+    /// rigs of each kind that is unlike the model: the tables of docs/identify.md, half an hour.
     Identify {
         /// Rigs.
         #[arg(default_value_t = 200)]
@@ -200,7 +201,7 @@ enum Verb {
         seed: u64,
     },
     /// Identifies and tunes hidden random rigs and motor axes, and drives them by the loop in virtual time: the tables of
-    /// docs/tune.md, half an hour. Stopped and started again it goes on with the next rig.
+    /// docs/tune.md, most of an hour. Stopped and started again it goes on with the next rig.
     Tune {
         /// Rigs.
         #[arg(default_value_t = 50)]
@@ -305,19 +306,33 @@ fn main() -> Result<()> {
         Verb::Drift => drift(),
         Verb::Identify { rigs, seed } => {
             let page = "docs/identify.md";
-            random_rigs(["clutch-identify", "identified_rigs"], page, "campaign", rigs, seed)?;
-            random_rigs(["clutch-identify", "unlike_rigs"], page, "unlike", rigs.div_ceil(4), seed + UNLIKE)?;
-            random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed + MOTORS)
+            let of = |example| ["clutch-identify", example];
+            for (example, name, first) in
+                [("identified_rigs", "campaign", seed), ("identified_motors", "motors", seed + MOTORS)]
+            {
+                random_rigs(of(example), page, name, (rigs, first), &[])?;
+                random_rigs(of(example), page, &format!("{name}_waves"), (rigs, first + WAVES), &["waves"])?;
+                other_loops(
+                    of(example),
+                    page,
+                    &format!("{name}_loops"),
+                    (rigs.div_ceil(10), first + LOOPS),
+                    &[],
+                )?;
+            }
+            random_rigs(of("unlike_rigs"), page, "unlike", (rigs.div_ceil(4), seed + UNLIKE), &[])
         }
         Verb::Tune { rigs, seed } => {
-            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", rigs, seed)?;
+            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", (rigs, seed), &[])?;
+            let (few, of) = (rigs.div_ceil(5), ["clutch-tune", "tuned_rigs"]);
+            other_loops(of, "docs/tune.md", "campaign_loops", (few, seed + LOOPS), &["waves"])?;
             // A reversal takes most of a minute to tune for.
             random_rigs(
                 ["clutch-tune", "tuned_motors"],
                 "docs/tune.md",
                 "motors",
-                (2 * rigs).div_ceil(5),
-                seed,
+                ((2 * rigs).div_ceil(5), seed),
+                &[],
             )
         }
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
@@ -479,12 +494,33 @@ fn meter() -> Result<()> {
 const MOTORS: u64 = 20_000;
 /// And to those of rigs that are unlike the model.
 const UNLIKE: u64 = 40_000;
+/// And to those of ripples of other waves, and of other encoders and periods.
+const WAVES: u64 = 80_000;
+/// See [`WAVES`].
+const LOOPS: u64 = 90_000;
+/// Encoders and periods other than 20 000 counts and 1 ms.
+const OTHER_LOOPS: [&str; 8] = [
+    "rig.encoder.counts_per_rev=4096",
+    "rig.encoder.counts_per_rev=8192 sampling.period_us=500",
+    "rig.encoder.counts_per_rev=10000",
+    "rig.encoder.counts_per_rev=65536",
+    "rig.encoder.counts_per_rev=200000",
+    "sampling.period_us=250",
+    "sampling.period_us=500",
+    "sampling.period_us=2000",
+];
 
 /// The campaign of a package's example over random rigs, into its page.
-fn random_rigs([package, example]: [&str; 2], page: &str, part: &str, rigs: u64, seed: u64) -> Result<()> {
+fn random_rigs(
+    [package, example]: [&str; 2],
+    page: &str,
+    part: &str,
+    (rigs, seed): (u64, u64),
+    words: &[&str],
+) -> Result<()> {
     let example = ["run", "--release", "--package", package, "--example", example, "--"];
     let (mut table, mut last) = (Vec::new(), String::new());
-    let done = cargo(example).args([rigs.to_string(), seed.to_string()]).lines(|line| {
+    let done = cargo(example).args([rigs.to_string(), seed.to_string()]).args(words).lines(|line| {
         if line.starts_with('|') {
             table.push(line.to_owned());
         } else if line.contains("rigs from seed") {
@@ -493,6 +529,19 @@ fn random_rigs([package, example]: [&str; 2], page: &str, part: &str, rigs: u64,
     })?;
     anyhow::ensure!(done, "the campaign failed");
     write_between(page, part, &format!("{}\n\n{last}", table.join("\n")))
+}
+
+/// The same rigs with other encoders and periods, and `more`, a row each.
+fn other_loops(of: [&str; 2], page: &str, part: &str, (rigs, seed): (u64, u64), more: &[&str]) -> Result<()> {
+    let (number, first) = (rigs.to_string(), seed.to_string());
+    let mut rows: Vec<String> = Vec::new();
+    for set in OTHER_LOOPS.iter().chain(more) {
+        let words: Vec<&str> =
+            [number.as_str(), first.as_str(), "short"].into_iter().chain(set.split(' ')).collect();
+        let table = table_in(of[0], of[1], &words)?;
+        rows.extend(table.lines().skip(if rows.is_empty() { 0 } else { 2 }).map(str::to_owned));
+    }
+    write_between(page, part, &format!("{}\n\n{rigs} rigs from seed {seed} for each row", rows.join("\n")))
 }
 
 /// The table that an example of the simulator prints.

@@ -225,12 +225,21 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     Err(open)
 }
 
+/// Speed limits that are tried in an attempt, each above the speed that the last one's set has.
+const CAPS: usize = 5;
+
+/// Speed above the path's that a set is first looked for with, counts per period: a count in a period is an edge more, and under a fine
+/// encoder, or in a long period, the same motion makes many.
+fn beyond_path(setup: &Setup) -> f64 {
+    0.8 * (f64::from(setup.counts_per_rev) / 20_000.0 * setup.period_s / 1e-3).max(1.0)
+}
+
 /// One attempt.
 fn attempt(parts: &Parts<'_>) -> Result<Cell, Open> {
     let tried = |f: &dyn Fn(f64) -> Result<Cell, (Open, f64)>| {
         let units = Units::new(parts.setup, parts.sliding, parts.slow, 0.0);
-        let mut cap = 1.3 * units.path + 0.8;
-        for _ in 0..3 {
+        let mut cap = 1.3 * units.path + beyond_path(parts.setup);
+        for _ in 0..CAPS {
             match f(cap) {
                 Err((Open::Slow, speed)) if speed > cap => cap = 1.1 * speed,
                 other => return other.map_err(|(why, _)| why),

@@ -4,6 +4,8 @@
 //! data as JSON: [`crate::file`].
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// Lower and upper end.
 pub type Ends = [f64; 2];
@@ -141,20 +143,20 @@ impl Setup {
         self.volts[1].max(self.start_volts[1]).ceil() + 1.0
     }
 
-    /// Keys in which two setups differ, with both values: `key: this, that`.
+    /// Fields in which two setups differ, each with its value here and there.
     #[must_use]
-    pub fn differences(&self, other: &Setup) -> Vec<String> {
+    pub fn differences(&self, other: &Setup) -> Vec<(String, Value, Value)> {
         let table = |s: &Setup| match serde_json::to_value(s) {
-            Ok(serde_json::Value::Object(table)) => table,
+            Ok(Value::Object(table)) => table,
             _ => serde_json::Map::new(),
         };
         let (own, other) = (table(self), table(other));
-        own.iter()
-            .filter(|(key, value)| other.get(*key) != Some(value))
-            .map(|(key, value)| {
-                format!("{key}: {value}, {}", other.get(key).unwrap_or(&serde_json::Value::Null))
-            })
-            .collect()
+        let fields: BTreeSet<&String> = own.keys().chain(other.keys()).collect();
+        let value = |table: &serde_json::Map<String, Value>, field: &String| {
+            table.get(field).cloned().unwrap_or(Value::Null)
+        };
+        let both = fields.into_iter().map(|field| (field.clone(), value(&own, field), value(&other, field)));
+        both.filter(|(_, own, other)| own != other).collect()
     }
 }
 

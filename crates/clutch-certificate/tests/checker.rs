@@ -262,6 +262,36 @@ fn a_shell_with_another_slope_or_a_wider_boundary_is_refused() {
     assert!(check(&bad).is_err());
 }
 
+/// Under a fine encoder the same speed is many counts a period.
+#[test]
+fn a_finer_encoder_leaves_a_shell_its_bound() {
+    let law = Gains::Shell { slope: 50.0, boundary: 0.2 };
+    let one = Options {
+        refinements: 0,
+        patient: false,
+        work: 2_500_000_000,
+        error_limit: 0.1,
+        widest: 1.5,
+        narrowest: 1.5,
+    };
+    let [coarse, fine] = [20_000, 200_000].map(|counts_per_rev| {
+        let box_of = setup(law, 0.2, 1, 2.0);
+        let setup = Setup {
+            counts_per_rev,
+            ripple: 0.33,
+            sliding: [0.115; 2],
+            at_rest: [0.19, 0.21],
+            from_rest: true,
+            ..box_of
+        };
+        let found = search(&setup, &one, false);
+        assert!(found.complete(), "{counts_per_rev}: {:?}", found.open);
+        assert!(check(&found.certificate).is_ok(), "{counts_per_rev}");
+        degrees(&found.certificate)
+    });
+    assert!(fine < 1.02 * coarse && fine > 0.7 * coarse, "{fine}° with the finer one, {coarse}°");
+}
+
 #[test]
 fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
     let folder = std::env::temp_dir().join(format!("clutch-certificate-{}", std::process::id()));

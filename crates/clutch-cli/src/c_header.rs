@@ -8,6 +8,13 @@ use clutch_core::params::Kind;
 use clutch_settings::{Declared, SETTINGS_HASH, Setting};
 use std::fmt::Write as _;
 
+/// Words of C and C++ themselves, which no run can have as its name.
+const TAKEN: &str = "alignas alignof and asm auto bool break case catch char class compl concept const constexpr continue decltype \
+    default delete do double else enum explicit export extern false float for friend goto if inline int long main \
+    mutable namespace new noexcept not nullptr operator or private protected public register requires restrict \
+    return short signed sizeof static struct switch template this thread_local throw true try typedef typeid \
+    typename typeof union unsigned using virtual void volatile while xor";
+
 /// Prints the settings of a scenario as a C header for libclutch.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch scenario header mine.toml > run.h")]
@@ -22,6 +29,11 @@ pub(crate) struct HeaderVerb {
 impl HeaderVerb {
     pub(crate) fn run(&self) -> anyhow::Result<Exit> {
         let named = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        ensure!(
+            TAKEN.split(' ').all(|word| word != self.name),
+            "--name {}: is a word of C or C++ itself; expected another name",
+            self.name
+        );
         ensure!(
             self.name.chars().all(named) && self.name.starts_with(|c: char| c.is_ascii_alphabetic()),
             "--name {}: expected a name of C, of letters, digits and underscores",

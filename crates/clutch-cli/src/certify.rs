@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, beside, check_files, json, paragraph, report, wrote};
+use crate::output::{Exit, beside, check_files, json, paragraph, report, to_write, wrote};
 pub use crate::sampled::Asked;
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
@@ -11,9 +11,9 @@ use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::params::{
     DEG, DEG_S, DEG_S2, KG_M2, NM, NM_S_RAD, NM_V, NONE, PER_S, PERCENT, RAD_S, RAD_S2, Unit, V, V_S_RAD,
 };
-use clutch_core::{ActuatorKind, Bounds, Interval};
-use clutch_sim::scenario::{CertificateError, Plan, Sampled};
-use clutch_sim::{Scenario, ScenarioError};
+use clutch_core::{ActuatorKind, Interval};
+use clutch_sim::scenario::{CERTIFIED, CertificateError, Plan, Sampled, Table};
+use clutch_sim::{Scenario, ScenarioError, written};
 use serde_json::{Value, json as value};
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ pub(crate) struct Certify {
     #[arg(long)]
     sampled: bool,
     /// Writes that proof to a file, which --check reads.
-    #[arg(long, value_name = "FILE.json", requires = "sampled")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.json", requires = "sampled")]
     save: Option<PathBuf>,
     /// Checks the proof in a file, and that it is this scenario's, instead of looking for one.
     #[arg(long, value_name = "FILE.json", conflicts_with = "sampled")]
@@ -314,26 +314,18 @@ pub fn certificate(
 fn whole(scenario: &Scenario, sampled: &Sampled, bound: &Bound) -> Result<Value, ScenarioError> {
     let plan = scenario.plan()?;
     let outside = scenario.outside_bounds(&plan.bounds)?;
-    let (b, d) = (&plan.bounds, &plan.demand);
     let c: &Certificate = &plan.certificate;
-    let pair = |i: &Interval| value!([i.low, i.high]);
     let paper =
         |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
     Ok(value!({
         "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "law": scenario.spec().law.title(),
-        "certified": c.certified(),
+        (CERTIFIED): c.certified(),
         "reason": c.shortfall.map(reason),
         "rig_outside_bounds": outside,
-        "bounds": bounds_json(b, &pair),
-        "demand": {
-            "velocity_rad_s": d.velocity,
-            "acceleration_rad_s2": d.acceleration,
-            "reach_rate_rad_s2": d.reach_rate,
-            "start_error_rate_rad_s": d.start_error_rate,
-            "velocity_jump_rad_s": d.velocity_jump,
-        },
+        "bounds": pairs(written(&plan.bounds)),
+        "demand": pairs(written(&plan.demand)),
         "ahead": {
             "torque_nm": c.worst_torque,
             "inertia_kg_m2": c.worst_inertia,
@@ -360,18 +352,13 @@ fn whole(scenario: &Scenario, sampled: &Sampled, bound: &Bound) -> Result<Value,
     }))
 }
 
-fn bounds_json(b: &Bounds, pair: &dyn Fn(&Interval) -> Value) -> Value {
-    value!({
-        "inertia_kg_m2": pair(&b.inertia),
-        "drive_torque_nm": pair(&b.drive_torque),
-        "viscous_damping_nm_s_rad": pair(&b.viscous_damping),
-        "actuator": b.actuator.name(),
-        "brake_gain_nm_v": pair(&b.brake_gain),
-        "motor_gain_nm_v": pair(&b.motor_gain),
-        "preload_nm": b.preload,
-        "load_share": b.load_share,
-        "friction_at_rest": pair(&b.friction_at_rest),
-        "friction_sliding": pair(&b.friction_sliding),
-        "friction": pair(&b.friction),
-    })
+/// A table as JSON, an interval in it as its two ends.
+fn pairs(table: Table) -> Value {
+    let one = |(key, value): (String, toml::Value)| {
+        let ends = value
+            .as_table()
+            .and_then(|i| Some(value!([i.get("low")?.as_float(), i.get("high")?.as_float()])));
+        (key, ends.unwrap_or_else(|| value!(value)))
+    };
+    table.into_iter().map(one).collect::<serde_json::Map<_, _>>().into()
 }

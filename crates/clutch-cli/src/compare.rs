@@ -1,7 +1,7 @@
 //! `clutch compare`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{Exit, bars, json, report, with_progress, wrote};
+use crate::output::{Exit, bars, json, report, to_write, with_progress, wrote};
 use crate::plot;
 use crate::run_figure::{Drawn, figure, window};
 use crate::sim::{Summary, largest_errors};
@@ -27,7 +27,7 @@ pub(crate) struct Compare {
     #[arg(long)]
     json: bool,
     /// Draws them on common axes: closely around a stick, and whole.
-    #[arg(long, value_name = "FILE.svg|png")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
 }
 

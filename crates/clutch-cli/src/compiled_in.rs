@@ -30,7 +30,7 @@ pub(crate) struct Compiled {
     pub(crate) scenario: Scenario,
     pub(crate) run: BuiltRun<f32>,
     pub(crate) settings: Settings,
-    /// What is known of the gains, a line each.
+    /// Verdicts on the gains, a line each.
     pub(crate) verdicts: Vec<String>,
 }
 

@@ -1,7 +1,7 @@
 //! `clutch friction`.
 
 use crate::args::key_value;
-use crate::output::{Exit, paragraph, print, tell, wrote};
+use crate::output::{Exit, paragraph, print, tell, to_write, wrote};
 use crate::plot::{self, Figure, Panel, Series};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -38,7 +38,7 @@ enum Verb {
         #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
         set: Vec<(String, String)>,
         /// The figure: .svg or .png.
-        #[arg(long, value_name = "FILE", default_value = "friction.svg")]
+        #[arg(long, value_parser = to_write(), value_name = "FILE", default_value = "friction.svg")]
         out: PathBuf,
     },
 }

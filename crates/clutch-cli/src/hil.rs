@@ -3,7 +3,7 @@
 use crate::args::{ScenarioArgs, key_value};
 use crate::images::image;
 use crate::live::LiveArg;
-use crate::output::{BUILD, Exit, json, not_certified, paragraph, remark, report, warn};
+use crate::output::{BUILD, Exit, json, not_certified, paragraph, remark, report, to_write, warn};
 use crate::signals::stop_flag;
 use crate::sim;
 use crate::table::{number, quantities};
@@ -59,7 +59,7 @@ pub(crate) struct Hil {
     #[arg(long, value_enum, default_value = "memory")]
     link: Link,
     /// Writes an MCAP log, with the shaft's true motion.
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.mcap")]
     log: Option<PathBuf>,
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
@@ -74,7 +74,7 @@ pub(crate) struct Hil {
     chip_fault: Vec<ChipFault>,
     /// Counts the instructions on the chip's model, and writes the numbers as JSON; takes several
     /// times as long.
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.json")]
     count: Option<PathBuf>,
     /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]

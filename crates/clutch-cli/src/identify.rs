@@ -2,16 +2,19 @@
 
 use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
-use crate::output::{self, BUILD, Exit, folded, json, paragraph, remark, shown, tell, write, wrote};
+use crate::output::{
+    self, BUILD, Exit, folded, json, paragraph, remark, shown, tell, to_write, write, wrote,
+};
 use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
-use clutch_core::ActuatorKind;
 use clutch_identify::added::{Added, Separate};
-use clutch_identify::experiment::{ExperimentError, PartRunner, folder_for_logs};
-use clutch_identify::recording::MOST_TABLE_MIB;
-use clutch_identify::{Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file};
+use clutch_identify::experiment::{ExperimentError, FASTEST_DEG_S, PartRunner, folder_for_logs};
+use clutch_identify::recording::{MOST_TABLE_MIB, Scale};
+use clutch_identify::{
+    Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file, motor,
+};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::read_text_up_to;
@@ -20,7 +23,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 #[cfg(target_os = "linux")]
 use {
-    clutch_identify::experiment::REMEDY,
+    clutch_identify::experiment::remedy,
     clutch_loop::onlooker::Onlooker,
     clutch_loop::port::Address,
     clutch_loop::session::{Board, Session, SessionOptions},
@@ -64,7 +67,7 @@ pub(crate) struct Identify {
     #[command(flatten)]
     at_port: crate::elsewhere::AtPort,
     /// Folder for a log of each part; it may not hold them yet.
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_parser = to_write(), value_name = "FOLDER")]
     log: Option<PathBuf>,
     /// Reads these logs instead: MCAP, or CSV with --columns.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "log")]
@@ -87,18 +90,16 @@ pub(crate) struct Identify {
         default_value = "counts,volts"
     )]
     columns: Vec<String>,
-    /// Way that a motor axis may go forwards from where it rests, ° [default: 20].
-    #[arg(long, value_name = "DEG", conflicts_with = "from")]
+    #[arg(long, help = travel_help(), value_name = "DEG", conflicts_with = "from", allow_negative_numbers = true)]
     travel: Option<f64>,
-    /// Highest rate, °/s: 5 to 60 with a brake [default: 60].
-    #[arg(long, value_name = "DEG_S", conflicts_with = "from")]
+    #[arg(long, help = fastest_help(), value_name = "DEG_S", conflicts_with = "from", allow_negative_numbers = true)]
     fastest: Option<f64>,
     /// Writes [model] and [bounds] for scenarios, with the intervals.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Writes friction along the disc as [friction_map], for `--map` of sim and loop. Without releases T/J and delay are taken
     /// as the scenario has them.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.toml")]
     map: Option<PathBuf>,
     #[command(flatten)]
     live: LiveArg,
@@ -249,8 +250,8 @@ impl Identify {
             return Err(ExperimentError::Stopped(name.to_owned()));
         }
         if summary.verdict() != Verdict::Done {
-            let (part, cause) = (name.to_owned(), summary.cause_text());
-            return Err(ExperimentError::Ended { part, cause, remedy: REMEDY });
+            let (name, cause) = (name.to_owned(), summary.cause_text());
+            return Err(ExperimentError::Ended { part: name, cause, remedy: remedy(part) });
         }
         let whole = clutch_log::read(log, &Limits::default())?;
         Ok(Recording::from_log(name, &whole)?)
@@ -265,14 +266,26 @@ impl Identify {
             };
             let text =
                 read_text_up_to(file, MOST_TABLE_MIB).with_context(|| format!("{name}: cannot be read"))?;
-            let spec = scenario.spec();
-            let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
-            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);
-            return Ok(vec![Recording::from_csv(&name, &text, (counts, volts), scale)?]);
+            return Ok(vec![Recording::from_csv(&name, &text, (counts, volts), &Scale::of(scenario))?]);
         }
         let log = clutch_log::read(file, &Limits::default())?;
         Ok(Recording::from_log(&name, &log)?)
     }
+}
+
+fn travel_help() -> String {
+    let (least, most) = motor::experiment::TRAVELS_DEG;
+    let own = motor::experiment::Programme::default().travel_deg;
+    format!("Way that a motor axis may go forwards from where it rests, {least} to {most}° [default: {own}]")
+}
+
+fn fastest_help() -> String {
+    let (brake, axis) = (FASTEST_DEG_S, motor::experiment::FASTEST_DEG_S);
+    let own = motor::experiment::Programme::default().fastest_deg_s;
+    format!(
+        "Highest rate, {} to {} °/s with a brake [default: {}], {} to {} °/s with a motor [default: {own}]",
+        brake.0, brake.1, brake.1, axis.0, axis.1
+    )
 }
 
 /// The file of the friction along the disc, as it was found or as the law believed it to be.
@@ -312,12 +325,25 @@ fn text(report: &Identified) -> String {
             out.push('\n');
         }
     }
+    if let Some(waves) = report.waves() {
+        out += &format!("  {:<26}{waves:>10.0}  the likeliest           per turn\n", "waves of the ripple");
+    }
     for row in &rows {
         if let Finding::Refused(why) = row.finding {
             out += &paragraph(&format!("{}: not determined; {why}", row.label));
         }
     }
     report.unexplained().iter().for_each(|line| out += &paragraph(&format!("unexplained: {line}")));
+    if let (Identified::Motor(_), [first, .., last]) = (report, report.map())
+        && last.angle - first.angle < core::f64::consts::TAU
+    {
+        out += &paragraph(&format!(
+            "friction and load are those from {:.1} to {:.1}°: what varies once or twice a turn, as by a run-out, is a part of them, and \
+             another one elsewhere",
+            first.angle.to_degrees(),
+            last.angle.to_degrees()
+        ));
+    }
     if matches!(report, Identified::Brake(_)) { out } else { folded(&out) }
 }
 
@@ -328,7 +354,7 @@ fn one_by_one(separate: &Separate) -> String {
         match finding {
             Finding::Known(e) => {
                 let interval = format!("{} … {}", number(e.low), number(e.high));
-                out += &format!("  {label:<26}{:>10}  {interval:<23} {unit}\n", number(e.value));
+                out += &format!("  {label:<26}{:>10}  {interval:<23} {}\n", number(e.value), unit.text);
             }
             Finding::Refused(why) => out += &paragraph(&format!("{label}: not determined; {why}")),
         }
@@ -358,6 +384,7 @@ pub fn object(report: &Identified, separate: Option<&Separate>) -> Value {
         "break_aways": slips,
         "rides_rad_s": rates,
         "parameters": parameters,
+        "ripple_waves_per_turn": report.waves(),
         "unexplained": report.unexplained(),
         "map": report.map().iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
     });

@@ -170,7 +170,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     output::set_quiet(cli.quiet);
-    let outcome = match cli.verb {
+    let outcome = signals::outlive_full_files().and_then(|()| match cli.verb {
         #[cfg(target_os = "linux")]
         Verb::Loop(v) => v.run(),
         #[cfg(target_os = "linux")]
@@ -194,7 +194,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Reproduce(v) => v.run(),
         Verb::Completion(v) => v.run(Cli::command()),
         Verb::Man(v) => v.run(Cli::command()),
-    };
+    });
     match outcome {
         Ok(Exit::Done) => 0,
         Ok(Exit::Failed) => 1,

@@ -1,7 +1,7 @@
 //! `clutch log`.
 
 use crate::export::Export;
-use crate::output::{Exit, new_file, paragraph, print};
+use crate::output::{Exit, new_file, paragraph, print, to_write};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ enum Verb {
         #[arg(value_name = "LOG.mcap")]
         from: PathBuf,
         /// The new file.
-        #[arg(value_name = "NEW.mcap")]
+        #[arg(value_parser = to_write(), value_name = "NEW.mcap")]
         to: PathBuf,
     },
     /// Writes a channel as a table, CSV or Parquet: a row a record, units in the columns' names.
@@ -55,7 +55,14 @@ impl Log {
             }
             Verb::Recover { from, to } => {
                 new_file(&to)?;
-                paragraph(&clutch_log::recover(&from, &to, &Limits::default())?.to_string())
+                match clutch_log::recover(&from, &to, &Limits::default()) {
+                    Ok(done) => paragraph(&done.to_string()),
+                    // Half a copy would be in the way of the next attempt; the original is whole.
+                    Err(e) if std::fs::remove_file(&to).is_ok() => {
+                        anyhow::bail!("{e}; {} is removed again", to.display())
+                    }
+                    Err(e) => return Err(e.into()),
+                }
             }
             Verb::Export(export) => return export.run(),
         };

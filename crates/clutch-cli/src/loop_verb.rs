@@ -3,11 +3,12 @@
 use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
 use crate::output::{
-    BUILD, Exit, beside, coloured, folded, json, not_certified, paragraph, quiet, report, shown, warn,
+    BUILD, Exit, beside, coloured, folded, json, not_certified, paragraph, quiet, report, shown, to_write,
+    warn,
 };
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use clutch_core::params::Word;
@@ -27,7 +28,7 @@ use clutch_sim::metrics::Detected;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// A parser of one of some words, whose meanings are in the help.
 fn word<T: Clone + Send + Sync + 'static>(
@@ -86,10 +87,10 @@ pub(crate) struct Loop {
     #[arg(long)]
     baud: Option<u32>,
     /// Writes an MCAP log.
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.mcap")]
     log: Option<PathBuf>,
     /// Length of the run instead of run.duration_s, s.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
@@ -104,10 +105,10 @@ pub(crate) struct Loop {
         value_parser = word(Release::WORDS, Release::named))]
     release_test: Release,
     /// The longest way in that test of any shaft within the bounds, °, up to 10: a longer one finds more.
-    #[arg(long, value_name = "DEG", default_value_t = release::WAY_DEG)]
+    #[arg(long, value_name = "DEG", default_value_t = release::WAY_DEG, allow_negative_numbers = true)]
     release_deg: f64,
     /// Cycles per second instead of sampling.period_us, Hz.
-    #[arg(long, alias = "update_rate", value_name = "HZ")]
+    #[arg(long, alias = "update_rate", value_name = "HZ", allow_negative_numbers = true)]
     update_rate: Option<f64>,
     /// Keeps all memory in RAM.
     #[arg(long, alias = "lock_memory", value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
@@ -175,10 +176,6 @@ impl Loop {
         let stop = stop_flag()?;
         let live = self.live.start(&stop)?;
         let session = session.looked_at(live.map(|live| live as Arc<dyn Onlooker>));
-        // A log on a limited disk must end the log and not the loop.
-        let ignored = Arc::new(AtomicBool::new(false));
-        signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
-            .context("signals could not be caught")?;
         let scope = self.live.has_terminal();
         let show = std::io::stderr().is_terminal() && !quiet() && !scope;
         // Events that come while a scope has the terminal are printed after it.

@@ -8,7 +8,7 @@ use crate::table::number;
 use clap::Args;
 use clutch_sim::Scenario;
 use clutch_sim::smooth_speed::{
-    Axis, Cause, DISCS, ENCODER_LIMIT, GainMap, RATES_DEG_S, RateMap, SmoothSpeed, Trials, Tried, gain_map,
+    Axis, DISCS, ENCODER_LIMIT, GainMap, RATES_DEG_S, RateMap, SmoothSpeed, Trials, Tried, Wall, gain_map,
     law_keys, rate_map,
 };
 use serde::Serialize;
@@ -184,13 +184,13 @@ struct Shown {
 const LETTERS: &str = "USEJR.";
 
 /// Letter of the first cause that holds.
-fn letter(causes: &[Cause]) -> char {
+fn letter(causes: &[Wall]) -> char {
     match causes.first() {
-        Some(Cause::SampledLoop) => 'U',
-        Some(Cause::StribeckEdge) => 'S',
-        Some(Cause::EncoderEdge) => 'E',
-        Some(Cause::EdgeJolt) => 'J',
-        Some(Cause::Ripple) => 'R',
+        Some(Wall::SampledLoop) => 'U',
+        Some(Wall::StribeckEdge) => 'S',
+        Some(Wall::EncoderEdge) => 'E',
+        Some(Wall::EdgeJolt) => 'J',
+        Some(Wall::Ripple) => 'R',
         None => '.',
     }
 }

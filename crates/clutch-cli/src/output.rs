@@ -5,6 +5,7 @@ use anstream::adapter::strip_str;
 use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clutch_core::params::UNITS;
 use clutch_log::printable;
 use clutch_sim::progress::Report;
@@ -64,12 +65,23 @@ pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, fi
     paragraph(&refusal.to_string()) + &paragraph(&advice)
 }
 
-/// A file is never written over: it may be the only record of a run.
+/// A record of runs is never written over: it may be the only one.
 pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
     if path.exists() {
         anyhow::bail!("{}: exists already; name a new file", path.display());
     }
     Ok(())
+}
+
+/// A file or folder to write, of a command line: not the dash by which other commands mean standard output.
+pub(crate) fn to_write() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path.as_os_str() == "-" {
+            Err("expected a name: this result does not go to standard output")
+        } else {
+            Ok(path)
+        }
+    })
 }
 
 /// Refuses files that cannot be written: before a long run, not after. A file that stands there is not touched.
@@ -86,14 +98,6 @@ pub(crate) fn check_files<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> a
         if closed {
             anyhow::bail!("{}: cannot be written: it is read-only", file.display());
         }
-    }
-    Ok(())
-}
-
-/// A log is never written over: it may be the only record of a run.
-pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
-    if path.exists() {
-        anyhow::bail!("{}: exists already; name a new file for the log", path.display());
     }
     Ok(())
 }
@@ -358,10 +362,10 @@ pub(crate) struct Forms {
     #[arg(long)]
     json: bool,
     /// Draws the result.
-    #[arg(long, value_name = "FILE.svg|png")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
     /// Writes the result as a page, with the picture and every setting.
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.html")]
     html: Option<PathBuf>,
 }
 

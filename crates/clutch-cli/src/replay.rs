@@ -1,7 +1,7 @@
 //! `clutch replay`.
 
 use crate::args::key_value;
-use crate::output::{BUILD, Exit, paragraph, tell, wrote};
+use crate::output::{BUILD, Exit, paragraph, tell, to_write, wrote};
 use crate::plot::{self, Figure, Panel, Series, Shade};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -34,7 +34,7 @@ pub(crate) struct Replay {
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// Draws both commands and their difference, closely around a stick and whole.
-    #[arg(long, value_name = "FILE.svg|png")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
 }
 

@@ -1,6 +1,6 @@
 //! `clutch reproduce`.
 
-use crate::output::{Exit, json, paragraph, tell, with_progress, write};
+use crate::output::{Exit, json, paragraph, tell, to_write, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{Page, ReportFigure, ReportTable, claims_table};
 use crate::run_figure;
@@ -21,7 +21,7 @@ use std::path::PathBuf;
     Then open reproduce/report.html in a browser.")]
 pub(crate) struct Reproduce {
     /// Folder for figures, table and report; created if missing.
-    #[arg(long, value_name = "DIR", default_value = "reproduce")]
+    #[arg(long, value_parser = to_write(), value_name = "DIR", default_value = "reproduce")]
     out: PathBuf,
 }
 
@@ -42,7 +42,7 @@ impl Reproduce {
         let table3 = ReportTable {
             id: "table-3".to_owned(),
             title: "Table 3".to_owned(),
-            caption: "Table 3 of the paper, and the results here.".to_owned(),
+            caption: "Table 3 of the paper, and the results here. At 10 and 6 °/s PD is an unstable sampled loop on this rig, which friction merely clips (docs/smooth.md, the walls).".to_owned(),
             rows: table3_cells(&outcome.table3),
             words: 0,
         };

@@ -1,6 +1,6 @@
 //! `clutch completion` and `clutch man`: the command line as shells and `man` know it, made from its own description.
 
-use crate::output::{Exit, print, tell};
+use crate::output::{Exit, print, tell, to_write};
 use anyhow::Context;
 use clap::{Args, Command};
 use clap_complete::Shell;
@@ -33,7 +33,7 @@ impl Completion {
 #[command(after_help = "Example:\n  clutch man --out ~/.local/share/man/man1   # then: man clutch-sim")]
 pub(crate) struct Man {
     /// The folder of the pages; made where there is none.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_parser = to_write(), value_name = "DIR")]
     out: PathBuf,
 }
 

@@ -2,7 +2,9 @@
 
 use crate::args::ScenarioArgs;
 use crate::live::LiveArg;
-use crate::output::{BUILD, Exit, bars, json, new_log, paragraph, remark, report, with_progress, wrote};
+use crate::output::{
+    BUILD, Exit, bars, check_files, json, new_file, paragraph, remark, report, to_write, with_progress, wrote,
+};
 use crate::plot;
 use crate::run_figure::{Drawn, figure};
 use crate::sampled;
@@ -19,7 +21,7 @@ use clutch_sim::picture::{Envelope, Window};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::{NotPassive, Rig};
-use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
+use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario, Values};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -35,13 +37,13 @@ pub(crate) struct Sim {
     #[arg(long)]
     json: bool,
     /// Writes every sample to a CSV file.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Writes every sample, command and the shaft's true motion to an MCAP log.
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.mcap")]
     log: Option<PathBuf>,
     /// Draws position and velocity closely around a stick, error and voltage of the whole run.
-    #[arg(long, value_name = "FILE.svg|png")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
     #[command(flatten)]
     live: LiveArg,
@@ -58,7 +60,7 @@ pub(crate) struct Summary<'a> {
     detected: &'a Detected,
     reaching: Reaching,
     path: Path,
-    certified: bool,
+    certified_continuous_time: bool,
     /// The verdicts on the sampled loop, a paragraph each.
     #[serde(skip)]
     as_sampled: String,
@@ -104,8 +106,9 @@ impl Sim {
                 );
             }
         }
+        check_files([&self.csv, &self.plot, &self.log].into_iter().flatten())?;
         if let Some(log) = &self.log {
-            new_log(log)?;
+            new_file(log)?;
         }
         let scenario = self.scenario.load()?;
         self.scenario.remark_unused_map(&scenario);
@@ -167,7 +170,7 @@ impl<'a> Summary<'a> {
                 lowest_voltage_v: plan.envelope.lowest_voltage,
                 velocity_jump_rad_s: plan.envelope.start_jump.max(plan.envelope.velocity_jump),
             },
-            certified: plan.certificate.certified(),
+            certified_continuous_time: plan.certificate.certified(),
             as_sampled: sampled::short_lines(&as_sampled),
             sampled: sampled::json(&as_sampled, &sampled::Bound::NotLookedFor),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
@@ -215,7 +218,7 @@ fn text(s: &Summary<'_>, scenario: &Scenario, run: &Run) -> String {
             rows.push(("    bound (15)", number(bound), "s"));
         }
     }
-    let certified = match (s.certified, s.rig_outside_bounds.is_empty()) {
+    let certified = match (s.certified_continuous_time, s.rig_outside_bounds.is_empty()) {
         (true, true) => "certified for its bounds (exact sensor)",
         (true, false) => "certified for the model, not for this rig: see `clutch certify`",
         (false, _) => "not certified: see `clutch certify`",
@@ -298,28 +301,20 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
     let t = &run.trace;
     let wrong = || format!("{}: cannot be written", file.display());
     let mut out = csv::Writer::from_path(file).with_context(wrong)?;
-    let mut header: Vec<String> = SAMPLE_COLUMNS.map(|(name, _)| name.to_owned()).into();
-    header.extend(t.term_columns().map(|(name, _)| name));
+    let names = SAMPLE_COLUMNS.iter().map(|column| column.name.to_owned());
+    let header: Vec<String> = names.chain(t.term_columns().map(|(name, _)| name)).collect();
     out.write_record(&header).with_context(wrong)?;
+    let columns: Vec<Values<'_>> = SAMPLE_COLUMNS.iter().map(|column| (column.values)(t)).collect();
     for i in 0..t.time.len() {
-        let floats = |xs: &[f64]| xs.iter().map(f64::to_string).collect::<Vec<_>>();
-        let mut row = floats(&[
-            t.time[i],
-            t.target_position[i],
-            t.target_velocity[i],
-            t.target_acceleration[i],
-            t.position[i],
-            t.velocity[i],
-            t.error[i],
-        ]);
-        row.push(t.counts[i].to_string());
-        row.extend(floats(&[t.measured_error[i], t.error_rate[i]]));
-        row.push(t.code[i].to_string());
-        row.extend(floats(&[t.voltage[i], t.demand[i]]));
-        row.push((t.limit[i] as u8).to_string());
-        row.push(u8::from(t.stuck[i]).to_string());
-        row.extend(t.terms.iter().map(|(_, values)| values[i].to_string()));
-        out.write_record(&row).with_context(wrong)?;
+        let samples = columns.iter().map(|column| match column {
+            Values::Real(x) => x[i].to_string(),
+            Values::Counts(x) => x[i].to_string(),
+            Values::Codes(x) => x[i].to_string(),
+            Values::Limits(x) => (x[i] as u8).to_string(),
+            Values::Flags(x) => u8::from(x[i]).to_string(),
+        });
+        out.write_record(samples.chain(t.terms.iter().map(|(_, values)| values[i].to_string())))
+            .with_context(wrong)?;
     }
     out.flush().with_context(wrong)
 }

@@ -2,7 +2,7 @@
 
 use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
-use crate::output::{Exit, Forms, check_files, json, paragraph, tell, with_progress, write, wrote};
+use crate::output::{Exit, Forms, check_files, json, paragraph, tell, to_write, with_progress, write, wrote};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{Page, ReportFigure, ReportTable};
 use crate::table::number;
@@ -13,7 +13,7 @@ use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::Value;
 use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Keep, Scenario, ScenarioError};
-use clutch_tune::{Candidate, Options, Standing, Tuned, Verdict, tune};
+use clutch_tune::{Candidate, Options, Outcome, Tuned, Verdict, tune};
 use comfy_table::{CellAlignment, ContentArrangement, Table, TableStyle};
 use std::path::{Path, PathBuf};
 
@@ -44,10 +44,10 @@ pub(crate) struct Tune {
     #[arg(long)]
     uncertified: bool,
     /// Writes the tuned scenario, whole, with the rig as it is believed to be.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Writes the proof, which `clutch loop --certificate` and `clutch certify --check` read.
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE.json")]
     save: Option<PathBuf>,
     #[command(flatten)]
     forms: Forms,
@@ -125,9 +125,9 @@ pub fn verdict(tuned: &Tuned) -> String {
 /// Reason why nothing is given out.
 fn nothing(tuned: &Tuned) -> String {
     let first = |f: &dyn Fn(&Candidate) -> bool| tuned.candidates.iter().find(|c| f(c));
-    let refused = |c: &Candidate| matches!(c.standing, Standing::Refused { .. });
+    let refused = |c: &Candidate| matches!(c.outcome, Outcome::Refused { .. });
     let certified = |c: &Candidate| matches!(c.verdict, Verdict::Certified { .. });
-    let open = first(&|c| matches!(&c.standing, Standing::Uncertified { why } if !why.is_empty()));
+    let open = first(&|c| matches!(&c.outcome, Outcome::Uncertified { why } if !why.is_empty()));
     match (first(&|c| refused(c) && certified(c)), open, first(&refused)) {
         (None, Some(c), _) => format!(
             "no gains are given out: nothing is certified; of the smoothest, {}: {}; --uncertified takes it all the same",
@@ -154,16 +154,16 @@ fn nothing(tuned: &Tuned) -> String {
 
 /// Reason why a candidate lost.
 fn lost(c: &Candidate) -> String {
-    match &c.standing {
-        Standing::Chosen => "chosen".to_owned(),
-        Standing::Rougher { than } => format!("rougher, by {:.2}", c.score.cost.unwrap_or(0.0) - than),
-        Standing::Uncertified { why } if why.is_empty() => {
+    match &c.outcome {
+        Outcome::Chosen => "chosen".to_owned(),
+        Outcome::Rougher { than } => format!("rougher, by {:.2}", c.score.cost.unwrap_or(0.0) - than),
+        Outcome::Uncertified { why } if why.is_empty() => {
             "not looked at: nothing smoother is certified".to_owned()
         }
-        Standing::Uncertified { why } => format!("uncertified: {why}"),
-        Standing::Refused { why } => format!("refused: {why}"),
-        Standing::Strays => "leaves its path on a corner of the bounds".to_owned(),
-        Standing::Unstable => "no gains whose sampled loop is stable".to_owned(),
+        Outcome::Uncertified { why } => format!("uncertified: {why}"),
+        Outcome::Refused { why } => format!("refused: {why}"),
+        Outcome::Strays => "leaves its path on a corner of the bounds".to_owned(),
+        Outcome::Unstable => "no gains whose sampled loop is stable".to_owned(),
     }
 }
 
@@ -212,9 +212,14 @@ fn about(tuned: &Tuned) -> String {
         let at = format!("At {} °/s", rates.join(", "));
         (at, "the first second", "cycles/s + 30 × RMS error, ° + longest stick/20 ms + V/s over 1000")
     };
+    let next = if tuned.candidates.iter().any(|c| c.before > 0) {
+        " (of a law's next gains, (2) and (3), as many behind)"
+    } else {
+        ""
+    };
     format!(
-        "{at}, from rest, {corners}; figures are the worst of runs on discs 101 to 108, {settling} left out. Cost: {cost}. {:.0} s \
-         were simulated.",
+        "{at}, from rest, {corners}; figures are the worst of runs on discs 101 to 108{next}, {settling} left out. Cost: {cost}. \
+         {:.0} s were simulated.",
         tuned.simulated_s
     )
 }
@@ -244,10 +249,8 @@ fn text(tuned: &Tuned) -> String {
         let left_out =
             if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
         // A remark on all of them is made once.
-        let why = match &c.standing {
-            Standing::Uncertified { why } if Some(why) == tuned.uncovered.as_ref() => {
-                "uncertified".to_owned()
-            }
+        let why = match &c.outcome {
+            Outcome::Uncertified { why } if Some(why) == tuned.uncovered.as_ref() => "uncertified".to_owned(),
             _ => lost(c),
         };
         out += &paragraph(&format!("{}: {why}; {tried} sets of gains{left_out}", c.name));
@@ -311,8 +314,8 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
     let lowest = tuned.rates_deg_s.first().copied();
     for c in &tuned.candidates {
         let Some(scenario) = &c.scenario else { continue };
-        let title = match c.standing {
-            Standing::Chosen => format!("{} (chosen)", c.name),
+        let title = match c.outcome {
+            Outcome::Chosen => format!("{} (chosen)", c.name),
             _ => c.name.clone(),
         };
         panels.push(Panel {
@@ -362,7 +365,7 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
     let title = format!("{}: gains", tuned.believed.name());
     let mut laws = rows(tuned);
     for (row, why) in
-        laws.iter_mut().zip(std::iter::once("standing".to_owned()).chain(tuned.candidates.iter().map(lost)))
+        laws.iter_mut().zip(std::iter::once("outcome".to_owned()).chain(tuned.candidates.iter().map(lost)))
     {
         row.push(why);
     }

@@ -262,7 +262,7 @@ fn runs_are_compared_in_a_table_of_80_columns_and_on_common_axes() {
     }
 
     let set = ["--set", "reference.ramp.rate_deg_s=6", "--json"];
-    let all = ["pd_2", "smc_2", "ctc_2", "pid_2", "observer_smc_2"];
+    let all = ["pd_2", "smc_2", "ctc_2", "bench_pid_2", "observer_smc_2"];
     let o = clutch(&[&["compare"][..], &all, &set].concat());
     let value: serde_json::Value = serde_json::from_slice(&o.stdout).expect("only JSON");
     let runs = value["runs"].as_array().expect("runs");
@@ -515,6 +515,22 @@ fn a_file_that_cannot_be_written_is_refused_before_the_search() {
 }
 
 #[test]
+fn a_dash_is_no_file() {
+    for words in [
+        &["sim", "smc_2", "--csv", "-"][..],
+        &["sweep", "smc_2", "--over", "run.seed=1,2", "--out", "-"],
+        &["loop", "board_smc_2", "--log", "-"],
+        &["certify", "pd_2", "--sampled", "--save", "-"],
+        &["log", "recover", "run.mcap", "-"],
+    ] {
+        let o = clutch(words);
+        let said = err(&o);
+        assert_eq!(o.status.code(), Some(64), "{words:?}: {said}");
+        assert!(said.contains("expected a name: this result does not go to standard output"), "{said}");
+    }
+}
+
+#[test]
 fn reproduce_names_a_folder_that_it_cannot_make() {
     let dir = folder("reproduce");
     let file = dir.join("a_file");
@@ -633,7 +649,10 @@ fn the_file_and_the_sentences_of_the_motors_evening_are_what_comes() {
 
     let names = ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc", "motor_glide"];
     let proven = names.map(|name| told(&["certify", name]));
-    assert_eq!(proven.each_ref().map(|p| p["certified"] == true), [false, false, true, false, false]);
+    assert_eq!(
+        proven.each_ref().map(|p| p["certified_continuous_time"] == true),
+        [false, false, true, false, false]
+    );
     let bound = proven[2]["layer"]["error_bound_rad"].as_f64().unwrap().to_degrees();
     let sentence = format!("certified, for an error below {bound:.2}°");
     assert!(words.contains(&sentence), "lacks: {sentence}");
@@ -1142,6 +1161,11 @@ fn a_grid_of_which_one_half_is_refused_runs_the_other() {
     let many = ["--seeds", "1000000001", "--out", many.to_str().expect("UTF-8")];
     let o = clutch(&[&["sweep", "pd_2", "--over", "law.pd.kp_v_rad=1,2"][..], &many].concat());
     assert!(err(&o).contains("the grid has more than 1000000000 rows"), "{}", err(&o));
+    let other = dir.join("half.xlsx");
+    let o =
+        clutch(&["sweep", "pd_2", "--over", "law.pd.kp_v_rad=1,2", "--out", other.to_str().expect("UTF-8")]);
+    assert!(err(&o).contains("half.xlsx: expected a name that ends with .csv or .parquet"), "{}", err(&o));
+    assert!(!other.exists());
 }
 
 #[test]

@@ -99,6 +99,16 @@ impl<T: Real> Bounds<T> {
         self.friction.high * self.brake_gain.high
     }
 
+    /// Least torque that drives, for each volt, where friction of its own load is worst, N m/V: 0 with a brake.
+    pub(crate) fn drives_per_volt(&self) -> T {
+        self.motor_gain.low * (T::ONE - self.friction.high * self.load_share)
+    }
+
+    /// Least torque against a motion forwards for each volt of that side, N m/V: of a brake, or of a motor that drives backwards.
+    pub(crate) fn resists_per_volt(&self) -> T {
+        if self.actuator.drives_above_0() { self.drives_per_volt() } else { self.weakest_brake() }
+    }
+
     /// Torque that drives at a voltage, over all corners, N m.
     fn driving(&self, volts: T) -> Interval<T> {
         let k = &self.motor_gain;

@@ -289,19 +289,16 @@ fn sides<T: Real>(bounds: &Bounds<T>, demand: &Demand<T>, (lowest, highest): (T,
     let drive = &bounds.drive_torque;
     let drag = bounds.viscous_damping.high * demand.velocity;
     let preload = bounds.friction.high * bounds.preload;
-    let motor = bounds.motor_gain.low * (T::ONE - bounds.friction.high * bounds.load_share);
-    let brake = Side { gain: bounds.weakest_brake(), load: drive.high, highest };
+    let [against, with] = bounds.actuator.most_volts(lowest, highest);
+    // What drives both ways is ahead on a way back, too, where friction and damping are against it.
+    let ahead = if bounds.actuator.drives_above_0() { drive.high + preload + drag } else { drive.high };
     // A force that never lets go is against the shaft that is behind.
     let released = drag - (drive.low - bounds.strongest_brake() * lowest.max(T::ZERO) - preload);
-    let (ahead, behind) = match bounds.actuator {
-        ActuatorKind::Brake => (brake, Side { gain: T::ZERO, load: released, highest: T::ZERO }),
-        ActuatorKind::Both => (brake, Side { gain: motor, load: released, highest: -lowest }),
-        ActuatorKind::Motor => (
-            Side { gain: motor, load: drive.high + preload + drag, highest: -lowest },
-            Side { gain: motor, load: drag + preload - drive.low, highest },
-        ),
-    };
-    Sides { ahead, behind, reverses: bounds.drives(lowest, highest).low < T::ZERO }
+    Sides {
+        ahead: Side { gain: bounds.resists_per_volt(), load: ahead, highest: against },
+        behind: Side { gain: bounds.drives_per_volt(), load: released, highest: with },
+        reverses: bounds.drives(lowest, highest).low < T::ZERO,
+    }
 }
 
 impl<T: Real> Certificate<T> {

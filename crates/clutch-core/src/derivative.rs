@@ -40,7 +40,7 @@ pub struct DerivativeState<T> {
 impl<T: Real> DerivativeState<T> {
     /// At an error that does not change.
     #[must_use]
-    pub fn at(error: FixedCounts) -> Self {
+    pub const fn at(error: FixedCounts) -> Self {
         DerivativeState { previous: error, rate: T::ZERO }
     }
 }

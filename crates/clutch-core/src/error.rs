@@ -67,11 +67,13 @@ impl<T: Real> fmt::Display for ParamError<T> {
             let ParamError { table, row, value, .. } = self;
             return write!(f, "row {row} of {table:?} = {value}: out of range");
         };
-        write!(f, "{} = {}: expected ", row.field, self.value)?;
-        match self.relation() {
-            Some(relation) => f.write_str(relation.expected),
-            None => row.range.words(row.kind, &row.unit, row.kind == Kind::Real).fmt(f),
-        }
+        let Some(relation) = self.relation() else {
+            write!(f, "{} = {}: expected ", row.field, self.value)?;
+            return row.range.words(row.kind, &row.unit, row.kind == Kind::Real).fmt(f);
+        };
+        // It speaks of keys, in their units.
+        let value = T::from_f64(row.unit.from_si(self.value.to_f64()));
+        write!(f, "{} = {value}: expected {}", row.key, relation.expected)
     }
 }
 

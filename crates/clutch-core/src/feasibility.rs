@@ -215,32 +215,27 @@ fn needed<T: Real>(bounds: &Bounds<T>, velocity: T, acceleration: T) -> Interval
 
 /// Lowest and highest voltage that give a moving shaft a torque of an interval at all corners, V.
 fn volts_for<T: Real>(bounds: &Bounds<T>, needed: &Interval<T>, forwards: bool) -> Interval<T> {
-    let (weakest, mu) = (bounds.weakest_brake(), &bounds.friction);
+    let mu = &bounds.friction;
     let drag = (mu.low * bounds.preload, mu.high * bounds.preload);
     // Against the motion friction of the load takes a share of each volt; where it helps to slow down, no help is counted.
-    let taken = mu.high * bounds.load_share;
     let driven = |torque: T, slows: bool| {
-        torque / (bounds.motor_gain.low * if slows { T::ONE } else { T::ONE - taken })
+        let per_volt = if slows { bounds.motor_gain.low } else { bounds.drives_per_volt() };
+        if per_volt > T::ZERO { torque / per_volt } else { T::ZERO }
     };
-    match bounds.actuator {
-        ActuatorKind::Brake => {
-            let volts = (-needed.low - drag.0) / weakest;
-            Interval { low: T::ZERO, high: volts.max(T::ZERO) }
-        }
-        ActuatorKind::Both => {
-            let (brake, motor) =
-                ((-needed.low - drag.0) / weakest, (needed.high + drag.1) / bounds.motor_gain.low);
-            Interval { low: -motor.max(T::ZERO), high: brake.max(T::ZERO) }
-        }
-        ActuatorKind::Motor => {
-            let (low, high) = if forwards {
-                (needed.low + drag.0, needed.high + drag.1)
-            } else {
-                (needed.low - drag.1, needed.high - drag.0)
-            };
-            Interval { low: driven(low.min(T::ZERO), forwards), high: driven(high.max(T::ZERO), !forwards) }
-        }
+    if bounds.actuator.drives_above_0() {
+        let (low, high) = if forwards {
+            (needed.low + drag.0, needed.high + drag.1)
+        } else {
+            (needed.low - drag.1, needed.high - drag.0)
+        };
+        return Interval {
+            low: driven(low.min(T::ZERO), forwards),
+            high: driven(high.max(T::ZERO), !forwards),
+        };
     }
+    let resisted = (-needed.low - drag.0) / bounds.resists_per_volt();
+    let driving = driven((needed.high + drag.1).max(T::ZERO), false);
+    Interval { low: T::ZERO - driving, high: resisted.max(T::ZERO) }
 }
 
 /// Voltage that holds the resting shaft at the worst corner, V.

@@ -33,7 +33,7 @@ crate::params! {
     }
     relations(p) {
         /// Something moves the shaft.
-        DRIVES: drive_torque, "a torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor (model.actuator): let the drive turn the shaft forwards, or take a motor";
+        DRIVES: drive_torque, "a torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor (model.actuator): let the drive turn the shaft forwards, or turn the axis round, or take a motor";
     }
 }
 

@@ -158,7 +158,7 @@ impl SafeCodes {
         let seconds = period.period::<T>()?;
         state.check()?;
         let hold = |volts: T, presses: Relation, reached: Relation| {
-            presses.require(volts, actuator == ActuatorKind::Motor || volts > T::ZERO)?;
+            presses.require(volts, actuator.drives_above_0() || volts > T::ZERO)?;
             let (bottom, top) = (dac.volts(DacCode(0)), dac.volts(DacCode(u16::MAX)));
             reached.require(volts, volts >= bottom && volts <= top + dac.step())?;
             Ok(dac.code(volts))
@@ -201,8 +201,8 @@ pub struct SafeRun {
 impl SafeRun {
     /// Begins at the code that the converter has now.
     #[must_use]
-    pub fn begin(present: DacCode) -> SafeRun {
-        SafeRun { level: u32::from(present.0) << 16, periods: 0 }
+    pub const fn begin(present: DacCode) -> SafeRun {
+        SafeRun { level: (present.0 as u32) << 16, periods: 0 }
     }
 
     /// The code for the next period; the first call already gives the safe state's own.

@@ -79,7 +79,7 @@ pub struct SpiDac<S> {
 
 impl<S: SpiDevice> SpiDac<S> {
     /// A converter of a kind.
-    pub fn new(spi: S, kind: SpiKind) -> Self {
+    pub const fn new(spi: S, kind: SpiKind) -> Self {
         SpiDac { spi, kind }
     }
 }

@@ -14,7 +14,7 @@ pub struct Line<S, const ROOM: usize = 768> {
 
 impl<S: Read + ReadReady + Write + WriteReady, const ROOM: usize> Line<S, ROOM> {
     /// A line over a port.
-    pub fn new(port: S) -> Self {
+    pub const fn new(port: S) -> Self {
         Line { port, frames: [0; ROOM], gone: 0, filled: 0 }
     }
 

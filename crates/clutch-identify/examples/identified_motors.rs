@@ -18,8 +18,8 @@ mod random_rig;
 #[path = "random_rig/rows.rs"]
 mod rows;
 use campaign::{Campaign, Row};
-use random_rig::Outcome;
-use random_rig::motor::{Truth, truth};
+use random_rig::motor::{Truth, truth_with};
+use random_rig::{Outcome, Set, named};
 use rows::As;
 
 const ROWS: &[Row<Truth, Report>] = &[
@@ -36,14 +36,14 @@ const ROWS: &[Row<Truth, Report>] = &[
 ];
 
 fn main() -> Outcome<()> {
-    let run = |seed| {
-        let truth = truth(seed)?;
+    let run = |seed, set: &Set| {
+        let truth = truth_with(seed, set)?;
         let mut runner = PartRunner::default();
         let run = &mut |name: &str, part: &Scenario| runner.run(name, part);
         let report = identify(&experiment(&truth.scenario, &Programme::default(), run)?);
         Ok((truth, report))
     };
-    let found = |truth: &Truth, report: &Report| format!("{} {:?}", truth.scenario.name(), report.found);
+    let found = |truth: &Truth, report: &Report| format!("{}: {:?}", named(&truth.scenario), report.found);
     let seconds = Programme::default().seconds();
     Campaign { rows: ROWS, seconds, run, found, unexplained: |report| &report.unexplained }.print()
 }

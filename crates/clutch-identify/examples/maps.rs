@@ -3,7 +3,7 @@
 //! Each disc of `bench` is ridden once without a map, which makes one. A second ride begins half a degree farther and has no map,
 //! that one, or the one of the disc before.
 
-use clutch_identify::{Recording, Tick, map_as_believed, map_file, ride::Place};
+use clutch_identify::{Recorded, Recording, map_as_believed, map_file, ride::Place};
 use clutch_sim::Scenario;
 use clutch_sim::engine::EventKind;
 use clutch_sim::progress::UNWATCHED;
@@ -17,9 +17,8 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 const DISCS: std::ops::Range<u64> = 4001..4041;
 /// Rates of the second ride, °/s.
 const RATES: [f64; 4] = [2.0, 1.5, 1.0, 0.7];
-/// Rates of the ride that makes the map, °/s, and the way of it.
-const LEARNT_AT: [f64; 2] = [2.0, 4.0];
-const WAY: f64 = 16.0;
+/// Rates of the ride that makes the map, °/s, and the way of it, °; the last is that of `clutch identify`.
+const LEARNT_AT: [(f64, f64); 4] = [(2.0, 16.0), (4.0, 16.0), (4.0, 32.0), (5.0, 40.0)];
 
 fn scenario(seed: u64, rate: f64, rest: &str, run: &str) -> Outcome<Scenario> {
     let text = format!(
@@ -34,8 +33,8 @@ fn ridden(scenario: &Scenario) -> Outcome<Run> {
 }
 
 /// The map of a disc that a ride makes.
-fn learnt(seed: u64, rate: f64) -> Outcome<Vec<Place>> {
-    let scenario = scenario(seed, rate, "", &format!("duration_s = {:?}", WAY / rate))?;
+fn learnt(seed: u64, (rate, way): (f64, f64)) -> Outcome<Vec<Place>> {
+    let scenario = scenario(seed, rate, "", &format!("duration_s = {:?}", way / rate))?;
     let trace = ridden(&scenario)?.trace;
     let ticks = trace.counts.iter().zip(&trace.voltage);
     let recording = Recording {
@@ -45,8 +44,9 @@ fn learnt(seed: u64, rate: f64) -> Outcome<Vec<Place>> {
         counts_per_rev: scenario.spec().rig.encoder.sensor.counts_per_rev,
         step_volts: 20.0 / 4096.0,
         volts_before: trace.start_voltage,
+        glides_at: None,
         first_tick: 0,
-        ticks: ticks.map(|(&counts, &volts)| Tick { counts: counts.into(), volts }).collect(),
+        ticks: ticks.map(|(&counts, &volts)| Recorded { counts: counts.into(), volts }).collect(),
     };
     Ok(map_as_believed(&[recording], &scenario))
 }
@@ -123,19 +123,19 @@ fn main() -> Outcome<()> {
     }
     for rate in RATES {
         print_row(&format!("{rate} °/s, none"), rate, &vec![None; DISCS.count()])?;
-        for (at, maps) in &learnt_at {
+        for ((at, way), maps) in &learnt_at {
             let of: Vec<_> = maps.iter().map(|map| Some(&map[..])).collect();
-            print_row(&format!("{rate} °/s, of a ride at {at} °/s"), rate, &of)?;
+            print_row(&format!("{rate} °/s, of a ride at {at} °/s over {way}°"), rate, &of)?;
         }
         let (_, maps) = &learnt_at[0];
         let others: Vec<_> = (0..maps.len()).map(|i| Some(&maps[(i + 1) % maps.len()][..])).collect();
         print_row(&format!("{rate} °/s, of another disc"), rate, &others)?;
     }
-    for (at, of) in &errors {
+    for ((at, way), of) in &errors {
         let mean = of.iter().sum::<f64>() / of.len() as f64;
         let worst = of.iter().copied().fold(0.0, f64::max);
         println!(
-            "\nMaps of rides at {at} °/s over {WAY}° err by {:.2} % RMS in the mean, {:.2} % on the worst disc.",
+            "\nMaps of rides at {at} °/s over {way}° err by {:.2} % RMS in the mean, {:.2} % on the worst disc.",
             100.0 * mean,
             100.0 * worst
         );

@@ -67,7 +67,7 @@ fn main() -> Outcome<()> {
     let (rigs, first) = (number(50)?, number(50_001)?);
     let detail = number(0)? > 0;
     println!(
-        "| rig | cause named, friction refused | cause named, told with its interval | another reason named | ended by a check | \
+        "| rig | cause named, friction refused | cause named, found with its interval | another reason named | ended by a check | \
          nothing said | of these an interval misses |"
     );
     println!("|---|---|---|---|---|---|---|");

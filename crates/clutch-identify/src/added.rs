@@ -5,6 +5,7 @@
 
 use crate::Estimate;
 use crate::report::{Finding, Report, refused};
+use clutch_core::params::{KG, KG_M2, M, M_S2, NM, NM_S_RAD, NM_V, Unit};
 use clutch_sim::Scenario;
 use clutch_sim::drive::{DriveParams, WeightDrive};
 
@@ -21,14 +22,14 @@ pub struct Added {
 
 /// A mass is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key} = {value}: expected a number above 0, in {unit}")]
+#[error("{key} = {value}: expected a number above 0, in {}", .unit.text)]
 pub struct NoMass {
     /// Name of the number.
     pub key: &'static str,
     /// Its value.
     pub value: f64,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: Unit,
 }
 
 /// Findings of both experiments together.
@@ -64,8 +65,7 @@ impl Added {
     /// # Errors
     /// A number that is not above 0.
     pub fn check(&self) -> Result<(), NoMass> {
-        let numbers =
-            [("mass", self.mass, "kg"), ("radius", self.radius, "m"), ("gravity", self.gravity, "m/s²")];
+        let numbers = [("mass", self.mass, KG), ("radius", self.radius, M), ("gravity", self.gravity, M_S2)];
         match numbers.into_iter().find(|(_, x, _)| !(x.is_finite() && *x > 0.0)) {
             Some((key, value, unit)) => Err(NoMass { key, value, unit }),
             None => Ok(()),
@@ -139,13 +139,13 @@ pub fn separate(alone: &Report, with: &Report, added: &Added) -> Separate {
 impl Separate {
     /// Key (SI), name, unit and finding, in the order in which they are shown.
     #[must_use]
-    pub fn rows(&self) -> [(&'static str, &'static str, &'static str, &Finding); 5] {
+    pub fn rows(&self) -> [(&'static str, &'static str, Unit, &Finding); 5] {
         [
-            ("drive_torque_nm", "T", "N m", &self.torque),
-            ("inertia_kg_m2", "J", "kg m²", &self.inertia),
-            ("grip_nm_v", "μ_d K", "N m/V", &self.grip),
-            ("grip_at_rest_nm_v", "μ_s K", "N m/V", &self.grip_at_rest),
-            ("viscous_damping_nm_s_rad", "C", "N m s/rad", &self.viscous),
+            ("drive_torque_nm", "T", NM, &self.torque),
+            ("inertia_kg_m2", "J", KG_M2, &self.inertia),
+            ("grip_nm_v", "μ_d K", NM_V, &self.grip),
+            ("grip_at_rest_nm_v", "μ_s K", NM_V, &self.grip_at_rest),
+            ("viscous_damping_nm_s_rad", "C", NM_S_RAD, &self.viscous),
         ]
     }
 }

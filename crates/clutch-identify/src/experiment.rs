@@ -9,7 +9,7 @@
 
 use crate::recording::{ReadError, Recording};
 use crate::release;
-use clutch_core::edge_timed::waves_for;
+use clutch_core::edge_timed::{EdgeTimedParams, waves_seen};
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Real};
 use clutch_log::{LogError, LogWriter, Source};
@@ -65,8 +65,8 @@ const FOLLOWING_DEG: f64 = 6.0;
 /// Share of the speed limit with which a step of the path rises.
 const STEP_RATE: f64 = 0.8;
 
-/// Range of the highest rate of a ride, °/s.
-const FASTEST_DEG_S: (f64, f64) = (5.0, 60.0);
+/// Range of the highest rate of a ride, °/s; the last is the rate without a limit.
+pub const FASTEST_DEG_S: (f64, f64) = (5.0, 60.0);
 
 impl Programme {
     /// The programme whose rides are no faster, °/s.
@@ -163,13 +163,14 @@ pub enum ExperimentError {
         file: String,
     },
     /// The output does not let go.
-    #[error("output.lowest_v = {0}: expected 0, as a release lets the brake go, or at most 0")]
+    #[error("output.lowest_v = {0}: expected at most 0 V, as a release lets the brake go")]
     NoRelease(f64),
-    /// The output of a motor goes one way, or the model's actuator is none.
-    #[error(
-        "output.lowest_v = {0}: expected below 0, and a motor as [model.actuator], as the axis goes both ways"
-    )]
-    OneWay(f64),
+    /// The model's actuator is no motor.
+    #[error("model.actuator: expected a motor, as that of [rig.actuator]")]
+    NoMotor,
+    /// The output of a motor goes one way.
+    #[error("{0} = {1}: expected {2} 0 V, as the axis goes both ways")]
+    OneWay(&'static str, f64, &'static str),
     /// A limit that this rig's experiment has no use for.
     #[error("{0}: is a limit of the experiment on a motor axis, and [rig.actuator] is none")]
     OfMotors(&'static str),
@@ -195,7 +196,7 @@ pub enum ExperimentError {
         /// The cause, in words.
         cause: String,
         /// The remedy.
-        remedy: &'static str,
+        remedy: String,
     },
     /// Somebody here stopped a part.
     #[error("the part \"{0}\" was stopped by the operator; it is in its safe state")]
@@ -225,9 +226,29 @@ pub fn folder_for_logs(folder: &Path) -> Result<(), ExperimentError> {
 /// A function that makes one run of the loop, given the part's name and its scenario, and gives the recordings.
 pub type Runs<'a> = dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError> + 'a;
 
-/// For a part that a check ended.
-pub const REMEDY: &str = "Look at the rig first. Wider [bounds] help if they do not hold it, and a lower --fastest (fastest_deg_s) if it \
-     gathers speed too slowly for a ride";
+/// Counts that a sample may be off, below which steps of the encoder alone make samples that are not believed.
+const FEWEST_JUMP_COUNTS: f64 = 3.0;
+
+/// The remedy where a check ended a part.
+#[must_use]
+pub fn remedy(scenario: &Scenario) -> String {
+    let mut remedy = "Look at the rig first. Wider [bounds] help if they do not hold it, and a lower --fastest (fastest_deg_s) if it \
+                      gathers speed too slowly for a ride"
+        .to_owned();
+    let count_deg = 360.0 / f64::from(scenario.spec().rig.encoder.sensor.counts_per_rev);
+    let jump_deg = scenario
+        .safety()
+        .map_or(f64::INFINITY, |safety| (1e6 * safety.limits.supervisor.jump.to_degrees()).round() / 1e6);
+    if jump_deg < FEWEST_JUMP_COUNTS * count_deg {
+        remedy += &format!(
+            ". safety.limits.jump_deg = {jump_deg} is {:.1} counts of this encoder, so that samples of a sound shaft are not believed, and \
+             get no answer; expected {FEWEST_JUMP_COUNTS} counts or more, as {:.2}",
+            jump_deg / count_deg,
+            (100.0 * FEWEST_JUMP_COUNTS * count_deg).ceil() / 100.0
+        );
+    }
+    remedy
+}
 
 /// Runs the programme, part by part; `run` makes one run of the loop, and says what was recorded. Later parts are given
 /// what earlier ones gave.
@@ -343,7 +364,7 @@ fn glide(
 ) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
     let delay = fall.map_or(0.0, |fall| (fall.delay.value / spec.period.seconds::<f64>()).round().min(3.0));
-    let waves = waves_for(spec.rig.encoder.sensor.counts_per_rev);
+    let waves = waves_seen(EdgeTimedParams::<f64>::default().waves, spec.rig.encoder.sensor.counts_per_rev);
     let filter = table([
         ("delay_ticks", Value::Integer(delay as i64)),
         ("ripple_waves_per_turn", Value::Float(waves)),
@@ -437,7 +458,7 @@ impl PartRunner {
             return Err(ExperimentError::Ended {
                 part: name.to_owned(),
                 cause: cause_text(cause, report.standing.value, false, false),
-                remedy: REMEDY,
+                remedy: remedy(scenario),
             });
         }
         if report.stopped {

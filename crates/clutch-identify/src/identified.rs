@@ -172,6 +172,15 @@ impl Identified {
         }
     }
 
+    /// Waves of the ripple per turn, where rides show them.
+    #[must_use]
+    pub fn waves(&self) -> Option<f64> {
+        match self {
+            Identified::Brake(report) => report.waves,
+            Identified::Motor(report) => report.waves,
+        }
+    }
+
     /// Torque, inertia and friction one by one, with the findings of a second experiment with a mass added.
     ///
     /// # Errors

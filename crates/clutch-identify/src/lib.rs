@@ -10,6 +10,7 @@ pub mod filter;
 pub mod identified;
 pub mod map_file;
 pub mod motor;
+mod profile;
 pub mod recording;
 pub mod release;
 pub mod report;
@@ -21,7 +22,7 @@ pub mod unlike;
 pub use believed::{Believed, Corner, believed};
 pub use identified::{Consent, Experiment, Identified};
 pub use map_file::{map_as_believed, map_file};
-pub use recording::{ReadError, Recording, Tick};
+pub use recording::{ReadError, Recorded, Recording};
 pub use report::{Finding, Report, identify};
 pub use rig_file::RigFile;
 

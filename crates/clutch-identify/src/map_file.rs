@@ -1,7 +1,7 @@
 //! Friction along the disc, from a ride to `[friction_map]` of a scenario.
 
 use crate::recording::Recording;
-use crate::ride::{Place, rides};
+use crate::ride::{Place, rides, waves};
 use clutch_sim::Scenario;
 
 /// Friction along the disc where the slowest ride of the recordings went, with T/J and delay as the scenario believes them to
@@ -17,7 +17,7 @@ pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Pla
     };
     let pull = (spec.model.drive_torque / spec.model.inertia).abs();
     let slowest = recordings.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));
-    slowest.map_or_else(Vec::new, |ride| ride.told(pull, delay, None).map)
+    slowest.map_or_else(Vec::new, |ride| ride.told(pull, delay, waves(&[&ride], pull, delay), None).map)
 }
 
 /// The map as a file: `[friction_map]`, which `--map` puts into a scenario. `rig` says of which rig and ride it is.

@@ -1,5 +1,6 @@
 //! Input of the estimators: counts and the voltage given after each, from a log or a table.
 
+use clutch_core::reference::ReferenceParams;
 use clutch_core::supervisor::{Arrival, State};
 use clutch_core::{ActuatorKind, Dac, DacCode};
 use clutch_log::{CommandRecord, CommandSource, Log, SampleRecord};
@@ -8,7 +9,7 @@ use clutch_sim::{Scenario, ScenarioError};
 
 /// A sample, and the voltage that was given after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tick {
+pub struct Recorded {
     /// Counts of the encoder.
     pub counts: i64,
     /// Voltage given after the sample, V.
@@ -30,10 +31,51 @@ pub struct Recording {
     pub step_volts: f64,
     /// Voltage before the first tick's, V.
     pub volts_before: f64,
+    /// Rate of the ramp that a law with a filter of its own rode, which slides wherever friction is of its model, rad/s.
+    pub glides_at: Option<f64>,
     /// Tick of the run at which the stretch begins.
     pub first_tick: u64,
     /// The samples.
-    pub ticks: Vec<Tick>,
+    pub ticks: Vec<Recorded>,
+}
+
+/// [`Recording::glides_at`] of a run of a scenario.
+#[must_use]
+pub fn glides_at(scenario: &Scenario) -> Option<f64> {
+    let params = scenario.params();
+    let ReferenceParams::Ramp(ramp) = params.reference else { return None };
+    params.law.filter().map(|_| ramp.rate)
+}
+
+/// Facts that a table does not say of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// Sampling period, s.
+    pub period: f64,
+    /// Counts of the encoder in a turn.
+    pub counts_per_rev: u32,
+    /// As [`Recording::motor`].
+    pub motor: bool,
+    /// Least and greatest voltage that there may be, V.
+    pub volts: (f64, f64),
+}
+
+/// Share of the output's span by which a table's voltages may lie beyond it.
+const BEYOND: f64 = 0.1;
+
+impl Scale {
+    /// The scale of a scenario's samples and output.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Scale {
+        let (spec, output) = (scenario.spec(), scenario.params().output);
+        let beyond = BEYOND * (output.highest - output.lowest);
+        Scale {
+            period: spec.period.seconds(),
+            counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
+            motor: spec.rig.actuator.kind() == ActuatorKind::Motor,
+            volts: (output.lowest - beyond, output.highest + beyond),
+        }
+    }
 }
 
 /// Ticks or tables that no estimator can use.
@@ -51,7 +93,7 @@ pub enum ReadError {
         error: Box<ScenarioError>,
     },
     /// A log of another plant.
-    #[error("{0}: it is of {1}: expected a brake, which 0 V lets go, or a motor")]
+    #[error("{0}: its actuator is {1}: expected a brake, which 0 V lets go, or a motor")]
     Actuator(String, &'static str),
     /// Logs of both.
     #[error("{0} is of another actuator than {1}: expected recordings of one rig, a brake or a motor")]
@@ -157,6 +199,7 @@ impl Recording {
             counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
             step_volts: dac.volts(DacCode(1)) - dac.volts(DacCode(0)),
             volts_before: 0.0,
+            glides_at: glides_at(scenario),
             first_tick: 0,
             ticks: Vec::new(),
         };
@@ -174,7 +217,7 @@ impl Recording {
                 found.push(Recording { volts_before, first_tick: command.tick, ..template.clone() });
             }
             if let Some(recording) = found.last_mut() {
-                recording.ticks.push(Tick { counts: i64::from(sample.counts), volts: command.voltage });
+                recording.ticks.push(Recorded { counts: i64::from(sample.counts), volts: command.voltage });
             }
             (next, last) = (command.tick + 1, Some(command.voltage));
         }
@@ -186,7 +229,7 @@ impl Recording {
         Ok(found)
     }
 
-    /// A table of columns, one sample a row; `counts` and `volts` are the names of its columns, `motor` as [`Self::motor`].
+    /// A table of columns, one sample a row; `counts` and `volts` are the names of its columns.
     ///
     /// # Errors
     /// The row, the column, and what is expected there.
@@ -194,8 +237,9 @@ impl Recording {
         name: &str,
         text: &str,
         (counts, volts): (&str, &str),
-        (period, counts_per_rev, motor): (f64, u32, bool),
+        scale: &Scale,
     ) -> Result<Recording, ReadError> {
+        let &Scale { period, counts_per_rev, motor, volts: (least, most) } = scale;
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let heads = reader.headers().map_err(|e| table(name, &e.to_string()))?.clone();
         let column = |wanted: &str| {
@@ -222,7 +266,16 @@ impl Recording {
                 let what = format!("line {line}: counts = {read}: expected a whole number of counts");
                 return Err(table(name, &what));
             }
-            ticks.push(Tick { counts: read as i64, volts: number(volts)? });
+            let given = number(volts)?;
+            if !(least..=most).contains(&given) {
+                let head = heads.get(volts).unwrap_or("");
+                let what = format!(
+                    "line {line}, column \"{head}\" = {given}: expected volts within output.lowest_v and output.highest_v of the scenario, \
+                     and not far beyond: {least} to {most}"
+                );
+                return Err(table(name, &what));
+            }
+            ticks.push(Recorded { counts: read as i64, volts: given });
         }
         if ticks.len() < 2 {
             return Err(ReadError::Empty(name.to_owned()));
@@ -237,6 +290,7 @@ impl Recording {
             counts_per_rev,
             step_volts: if step_volts.is_finite() { step_volts } else { 0.0 },
             volts_before: ticks[0].volts,
+            glides_at: None,
             first_tick: 0,
             ticks,
         };
@@ -262,7 +316,7 @@ impl Recording {
         let mut other = self.clone();
         other.volts_before = -other.volts_before;
         // −1 − n keeps counts that floor.
-        other.ticks.iter_mut().for_each(|t| *t = Tick { counts: -1 - t.counts, volts: -t.volts });
+        other.ticks.iter_mut().for_each(|t| *t = Recorded { counts: -1 - t.counts, volts: -t.volts });
         other
     }
 

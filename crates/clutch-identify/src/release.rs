@@ -26,10 +26,11 @@ const DELAY_STEP: f64 = 0.025;
 const DAMPINGS: usize = 12;
 /// Periods by which delays of releases may be apart: a lag as long as that shows in the falls themselves.
 const MOST_APART: f64 = 3.0;
-/// Counts by which an edge of the encoder may be off, half a step of the delay among them.
+/// Counts by which an edge of the encoder may be off, half a step of the delay among them: of 20 000 counts at 1 ms, and of fewer
+/// or shorter ones.
 const SLACK: f64 = 0.06;
-/// Counts by which it may be off where each release has a delay of its own: at first, and where that explains nothing.
-const LOOSER: [f64; 2] = [SLACK, 0.5];
+/// The same where each release has a delay of its own and that explains nothing.
+const LOOSER: f64 = 0.5;
 
 /// A fall from rest.
 #[derive(Clone, Debug)]
@@ -106,6 +107,14 @@ pub fn releases(recording: &Recording) -> Vec<Release> {
     found
 }
 
+/// Times the slack that edges of these releases may be off: between two steps a shaft goes the more counts the finer these are,
+/// and the longer a period.
+fn coarser(releases: &[Release]) -> f64 {
+    let finest =
+        |release: &Release| release.units.0 / 1e-3 * (core::f64::consts::TAU / 20_000.0) / release.units.1;
+    releases.iter().map(finest).fold(1.0, f64::max)
+}
+
 /// Fall from rest in a time at unit acceleration, with damping.
 fn flight(time: f64, damping: f64) -> f64 {
     let x = damping * time;
@@ -160,7 +169,8 @@ pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplai
         Err(at) => at,
     };
     let period = releases.first().map_or(1e-3, |r| r.units.0);
-    for (slack, own) in [(LOOSER[0], false), (LOOSER[1], true)] {
+    let [sharp, looser] = [SLACK, LOOSER].map(|slack| slack * coarser(releases));
+    for (slack, own) in [(sharp, false), (looser, true)] {
         at.apart = match with_own_delays(releases, dampings, slack) {
             Some(late) if late.delay.high - late.delay.low <= MOST_APART * period => return Ok(late),
             Some(late) => Some(Apart::Delays(late.delay.low, late.delay.high)),
@@ -174,12 +184,12 @@ pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplai
     let (alone, rest): (Vec<Release>, Vec<Release>) = releases
         .iter()
         .cloned()
-        .partition(|r| with_own_delays(std::slice::from_ref(r), dampings, LOOSER[1]).is_none());
+        .partition(|r| with_own_delays(std::slice::from_ref(r), dampings, looser).is_none());
     at.apart = match alone.len() {
         0 => None,
-        1 => with_own_delays(&rest, dampings, LOOSER[1])
+        1 => with_own_delays(&rest, dampings, looser)
             .is_none()
-            .then(|| with_own_pulls(&rest, dampings, LOOSER[1], true))
+            .then(|| with_own_pulls(&rest, dampings, looser, true))
             .flatten(),
         number => Some(Apart::Within(number)),
     };
@@ -259,13 +269,14 @@ fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Un
     let mut sums = [0.0; 3];
     let mut longest = (0, 0, 0);
     let period = releases.first().map_or(1e-3, |r| r.units.0);
+    let slack = SLACK * coarser(releases);
     for delay in delays(releases) {
         for k in 0..DAMPINGS {
             let damping = between(dampings, k);
             let mut bounds = (0.0, f64::INFINITY);
             let mut explained = 0;
             let failed = releases.iter().enumerate().find_map(|(n, release)| {
-                let failed = release.narrow(delay, damping, SLACK, &mut bounds).err();
+                let failed = release.narrow(delay, damping, slack, &mut bounds).err();
                 explained += failed.unwrap_or(release.counts.len());
                 failed.map(|at| (n, at))
             });

@@ -4,7 +4,7 @@ use crate::break_away::{self, BreakAway, Known, break_aways};
 use crate::confidence::{DEVIATIONS, FALL};
 use crate::recording::Recording;
 use crate::release::{self, Fall, Release};
-use crate::ride::{Place, Ride, Told, rides, uneven};
+use crate::ride::{Place, Ride, Told, rides, uneven, waves};
 use crate::{DAMPINGS, Estimate, unlike};
 use serde::Serialize;
 
@@ -16,6 +16,12 @@ const FEWEST_SLIPS: usize = 3;
 const EVEN: f64 = 0.02;
 /// Most releases and break-aways that are looked at: a minute of an experiment has fewer.
 const MOST: usize = 60;
+/// Share of its rate below which a shaft nearly stops.
+const STOPS: f64 = 0.2;
+/// Share by which the size of a ripple is off that a ride shows on which the shaft nearly stops.
+const ROUGHLY: f64 = 0.1;
+/// Ripple that an even disc seems to have: steps of the converter, and a filter that looks for one.
+const NOISE: f64 = 5e-3;
 /// Ripple that is always reckoned with, as a share.
 const LEAST_RIPPLE: f64 = 0.03;
 /// Normalised innovation of an edge that no ride has: one in millions.
@@ -61,6 +67,8 @@ pub struct Report {
     pub hold: Finding,
     /// Root mean square of friction's variation along the disc, as a share.
     pub ripple: Finding,
+    /// Waves of that ripple per turn, where rides show them.
+    pub waves: Option<f64>,
     /// μ_s/μ_d.
     pub ratio: Finding,
     /// Stribeck velocity, rad/s.
@@ -89,8 +97,9 @@ pub fn identify(recordings: &[Recording]) -> Report {
     let releases: Vec<Release> = recordings.iter().flat_map(release::releases).take(MOST).collect();
     let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).take(MOST).collect();
     let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
-    let found = (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect());
-    let motion = Motion::of(&releases, rides, &recordings.iter().flat_map(uneven).collect::<Vec<_>>());
+    let counted = (releases.len(), slips.len());
+    let stretches = recordings.iter().flat_map(uneven).collect::<Vec<_>>();
+    let motion = Motion::of(&releases, rides, &stretches, unlike::sticks(recordings));
     let (ratio, stribeck) = motion.at_rest(&slips);
     let no_ride = motion
         .cause
@@ -102,6 +111,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
         delay: motion.of_fall(|fall| fall.delay),
         hold: motion.hold.map_or_else(|| refused(no_ride), Finding::Known),
         ripple: slowest.map_or_else(|| refused(no_ride), |slow| Finding::Known(ripple(slow))),
+        waves: slowest.map(|slow| slow.waves).filter(|waves| waves.seen).map(|waves| waves.per_turn),
         ratio,
         stribeck,
         damping: motion.damping.map_or_else(
@@ -112,7 +122,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
             Finding::Known,
         ),
         lag: refused(
-            "the delay holds dead time and lag together: releases from two voltages, far apart, separate the two",
+            "the delay holds dead time and lag together, which no experiment of this verb separates; the voltage measured at the brake does",
         ),
         each: refused(
             "counts and volts do not determine them, as all of them scaled alike move alike; a second experiment with a known mass added \
@@ -121,13 +131,14 @@ pub fn identify(recordings: &[Recording]) -> Report {
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
         uneven: slowest.map_or(0.0, |slow| slow.uneven),
         unexplained: motion.unexplained,
-        found,
+        found: (counted.0, counted.1, motion.rates),
     }
 }
 
 /// Findings of releases and rides.
 struct Motion {
-    /// The rides, the slowest first.
+    /// Rates of the rides, rad/s, and what these say, the slowest first.
+    rates: Vec<f64>,
     told: Vec<Told>,
     /// None without a release, or if no delay explains them.
     fall: Option<Fall>,
@@ -139,8 +150,16 @@ struct Motion {
 }
 
 impl Motion {
-    fn of(releases: &[Release], mut rides: Vec<Ride<'_>>, stretches: &[Ride<'_>]) -> Motion {
+    fn of(
+        releases: &[Release],
+        rides: Vec<Ride<'_>>,
+        stretches: &[Ride<'_>],
+        sticks: Option<String>,
+    ) -> Motion {
+        let rates = |rides: &[Ride<'_>]| rides.iter().map(|ride| ride.rate).collect::<Vec<_>>();
+        let found = rates(&rides);
         let unknown = |cause: Option<String>| Motion {
+            rates: found.clone(),
             told: Vec::new(),
             fall: None,
             damping: None,
@@ -155,12 +174,13 @@ impl Motion {
             Ok(fall) => fall,
             Err(at) => return unknown(Some(unlike::fall_refused(&at))),
         };
-        rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
-        let mut told = tell(&rides, &fall);
-        if let Some(cause) = told.first().and_then(|slow| unlike::bristles(stretches, slow, &fall)) {
+        let (told, mut unexplained) = tell(rides, &fall);
+        let (rides, mut told): (Vec<_>, Vec<_>) = told.into_iter().unzip();
+        let bristles = || told.first().and_then(|slow| unlike::bristles(stretches, slow, &fall));
+        if let Some(cause) = bristles().or(sticks) {
             return Motion { fall: Some(fall), ..unknown(Some(cause)) };
         }
-        let mut unexplained: Vec<String> = told.iter().filter_map(edge_off).collect();
+        unexplained.extend(told.iter().filter_map(edge_off));
         if let Some(share) = unlike::runout(&told) {
             for (ride, told) in rides.iter().zip(&mut told) {
                 told.hold.1 = told.hold.1.hypot(told.hold.0 * unlike::left_of_runout(share, ride.way()));
@@ -187,12 +207,13 @@ impl Motion {
         }
         if let Some(slack) = fall.looser {
             unexplained.push(format!(
-                "releases: no one delay explains their counts; one for each does, edges being off by {slack} counts: a lag of the \
+                "releases: no one delay explains their counts; one for each does, edges being off by {slack:.2} counts: a lag of the \
                  actuator, or a torque that varies"
             ));
         }
         let hold = hold(&told, line.as_ref(), Some(&fall));
-        Motion { told, fall: Some(fall), damping, hold, cause: None, unexplained }
+        let rates = rates(&rides);
+        Motion { rates, told, fall: Some(fall), damping, hold, cause: None, unexplained }
     }
 
     /// μ_s/μ_d and the Stribeck velocity, which take all that motion shows.
@@ -205,6 +226,7 @@ impl Motion {
             friction: 1.0 / hold.value,
             // No disc is so even that a model holds to the last count.
             ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
+            waves: slow.waves.per_turn,
         });
         if let Some(cause) = &self.cause {
             return (refused(cause), refused(cause));
@@ -251,20 +273,35 @@ pub(crate) fn edge_off(told: &Told) -> Option<String> {
 fn ripple(slow: &Told) -> Estimate {
     let (share, deviation) = slow.ripple;
     let off = DEVIATIONS * deviation;
-    Estimate { value: share, low: (share - off).max(0.0), high: share + off }
+    Estimate { value: share, low: (share - off - NOISE).max(0.0), high: share + off }
 }
 
-/// Findings of the rides, the slowest first: a fast one does not see the ripple, and takes its size from that.
-fn tell(rides: &[Ride<'_>], fall: &Fall) -> Vec<Told> {
+/// Findings of the rides, the slowest first, and the words on those left out. A fast one does not see the ripple, and takes its
+/// size from the slowest. One on which the shaft nearly stops shows friction that is not that of sliding, and of a ripple no
+/// more than its size.
+fn tell<'a>(mut rides: Vec<Ride<'a>>, fall: &Fall) -> (Vec<(Ride<'a>, Told)>, Vec<String>) {
+    rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+    let waves = waves(&rides.iter().collect::<Vec<_>>(), fall.pull.value, fall.delay.value);
     let mut share = None;
-    rides
-        .iter()
-        .map(|ride| {
-            let told = ride.told(fall.pull.value, fall.delay.value, share);
-            share = share.or(Some(told.ripple.0));
-            told
-        })
-        .collect()
+    let (mut even, mut left_out) = (Vec::new(), Vec::new());
+    for ride in rides {
+        let mut told = ride.told(fall.pull.value, fall.delay.value, waves, share);
+        share = share.or(Some(told.ripple.0));
+        if told.slowest < STOPS {
+            left_out.push(format!(
+                "{}: the shaft nearly stops on the way at {:.1} °/s, where friction is not that of sliding: left out",
+                ride.recording.name,
+                ride.rate.to_degrees()
+            ));
+            continue;
+        }
+        if !left_out.is_empty() {
+            told.ripple.1 = told.ripple.1.hypot(ROUGHLY * told.ripple.0);
+        }
+        even.push((ride, told));
+    }
+    left_out.dedup();
+    (even, left_out)
 }
 
 /// The straight line `1/h_v = A − B v` through rides, with its covariance.

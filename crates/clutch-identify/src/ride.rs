@@ -4,7 +4,9 @@
 //! ride gives `1/h_v = (1/h) (1 − (c/g) v)`: a straight line over the rates, whose value at 0 is `v_hold = 1/h` and whose slope
 //! gives C/J.
 
+use crate::confidence::FALL;
 use crate::filter::{Belief, Passed, Shaft, Spread, smooth};
+use crate::profile::spaced;
 use crate::recording::Recording;
 
 /// Longest silence in a ride, times the median time between edges.
@@ -29,9 +31,15 @@ const PASS: Conditions =
 /// Motion between two sticks, uneven as it is.
 const STRETCH: Conditions =
     Conditions { settling_s: 0.1, shortest_s: 0.2, shortest_rad: 0.02, halves: (0.5, 2.0) };
-/// Waves per turn that a ripple is taken to have, and their damping: a wide band, as the law glide believes.
-pub const WAVES_PER_TURN: f64 = 340.0;
-/// See [`WAVES_PER_TURN`].
+/// Waves per turn that a ripple is taken to have where rides do not show them: those that the law glide believes.
+pub(crate) const WAVES_PER_TURN: f64 = 340.0;
+/// Waves that are looked for: the fewest, the counts that one has at least, and how many to a factor of two.
+const FEWEST_WAVES: f64 = 12.0;
+const COUNTS_PER_WAVE: f64 = 12.0;
+const TO_THE_OCTAVE: f64 = 4.0;
+/// Sizes with which they are looked for, as a share.
+const SHARES: [f64; 4] = [0.02, 0.05, 0.1, 0.17];
+/// Damping of the waves: a wide band, as the law glide believes.
 pub const WAVE_DAMPING: f64 = 0.25;
 /// Wander of the velocity that no friction explains, rad/s/√s.
 pub const WALK: f64 = 0.01;
@@ -45,8 +53,8 @@ const ROUNDS: usize = 8;
 const FIRST_SHARE: f64 = 0.15;
 /// The rest of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
 const LEFT_OVER: f64 = 2.0;
-/// Part of the ripple's square that the filter may miss in a mean.
-const UNSEEN: f64 = 0.04;
+/// Part of the unseen ripple that the volts go with.
+const UNSEEN: f64 = 0.5;
 /// Points of a map per turn: of the waves of a disc, each has fifteen.
 const PER_TURN: f64 = 5000.0;
 /// Sections of a turn, of which each has some ten waves of a ripple and more.
@@ -84,10 +92,14 @@ pub struct Told {
     pub hold: (f64, f64),
     /// Root mean square of the ripple, as a share of friction, and its standard deviation.
     pub ripple: (f64, f64),
+    /// Waves of the ripple per turn, as known, and if rides show them.
+    pub waves: Waves,
     /// Friction along the way, but for its very beginning.
     pub map: Vec<Place>,
     /// Mean friction of each whole section of a turn, one behind the other, 1/V or V.
     pub sections: Vec<f64>,
+    /// Its lowest velocity, as a share of its rate; of a motor's pass that of its end, where the law brakes.
+    pub slowest: f64,
     /// The most that friction departs from its mean, as a share, while the ride is even.
     pub uneven: f64,
     /// Recording, tick and normalised innovation of the edge that fits worst.
@@ -95,13 +107,49 @@ pub struct Told {
 }
 
 /// The share that a ripple leaves in the mean over a stretch, which does not hold whole waves; radians of the wave.
-fn left_over(ripple: f64, radians: f64) -> f64 {
+pub(crate) fn left_over(ripple: f64, radians: f64) -> f64 {
     LEFT_OVER * ripple / radians.max(1.0)
 }
 
 /// The same of a section.
-pub(crate) fn section_rest(ripple: f64) -> f64 {
-    left_over(ripple, WAVES_PER_TURN * core::f64::consts::TAU / SECTIONS)
+pub(crate) fn section_rest(ripple: f64, waves: f64) -> f64 {
+    left_over(ripple, waves * core::f64::consts::TAU / SECTIONS)
+}
+
+/// Waves of a ripple.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waves {
+    /// Waves per turn.
+    pub per_turn: f64,
+    /// `true` if rides show them; else they are those that are taken unseen.
+    pub seen: bool,
+}
+
+/// Waves per turn of the ripple that makes the edges of rides likeliest; those that are taken unseen where no others are
+/// clearly likelier. For T/J (rad/s², of a motor K/J) and delay (s) as known.
+#[must_use]
+pub(crate) fn waves(rides: &[&Ride<'_>], pull: f64, delay: f64) -> Waves {
+    let Some(first) = rides.first() else { return Waves { per_turn: WAVES_PER_TURN, seen: false } };
+    let density = |waves: f64| -> f64 {
+        let with = |share: f64| -> f64 {
+            let each = rides.iter().map(|ride| {
+                let friction = ride.rough();
+                let shaft = shaft(ride.recording, pull, 0.0, share * friction, waves);
+                ride.density(&shaft, delay, friction, 0.0)
+            });
+            each.sum()
+        };
+        SHARES.map(with).into_iter().fold(f64::NEG_INFINITY, f64::max)
+    };
+    let most = f64::from(first.recording.counts_per_rev) / COUNTS_PER_WAVE;
+    let unseen = WAVES_PER_TURN.min(most);
+    let number = (TO_THE_OCTAVE * (most / FEWEST_WAVES).log2()).ceil().max(0.0) as usize + 2;
+    let best = spaced(FEWEST_WAVES, most.max(2.0 * FEWEST_WAVES), number)
+        .map(|per_turn| (Waves { per_turn, seen: true }, density(per_turn)))
+        .fold((Waves { per_turn: unseen, seen: false }, density(unseen) + FALL), |best, next| {
+            if next.1 > best.1 { next } else { best }
+        });
+    best.0
 }
 
 /// The rides in a recording.
@@ -153,17 +201,17 @@ fn stretches<'a>(recording: &'a Recording, conditions: &Conditions) -> Vec<Ride<
     found
 }
 
-/// The shaft in counts and periods; `damping` in 1/s, `ripple` in 1/V.
+/// The shaft in counts and periods; `damping` in 1/s, `ripple` in 1/V, `waves` of it per turn.
 #[must_use]
-pub fn shaft(recording: &Recording, pull: f64, damping: f64, ripple: f64) -> Shaft {
-    shaft_with(recording, pull, damping, ripple, (WAVE_DAMPING, WALK))
+pub fn shaft(recording: &Recording, pull: f64, damping: f64, ripple: f64, waves: f64) -> Shaft {
+    shaft_with(recording, pull, damping, (ripple, waves), (WAVE_DAMPING, WALK))
 }
 
 fn shaft_with(
     recording: &Recording,
     pull: f64,
     damping: f64,
-    ripple: f64,
+    (ripple, waves): (f64, f64),
     (wave_damping, walk): (f64, f64),
 ) -> Shaft {
     let walk = walk * recording.period.sqrt() * recording.period / recording.radians_per_count();
@@ -171,7 +219,7 @@ fn shaft_with(
         pull: pull * recording.per_rad_s2(),
         motor: recording.motor,
         damping: damping * recording.period,
-        wave: WAVES_PER_TURN * recording.radians_per_count(),
+        wave: waves * recording.radians_per_count(),
         wave_damping,
         ripple,
         walk: walk * walk,
@@ -179,21 +227,37 @@ fn shaft_with(
 }
 
 impl Ride<'_> {
-    /// Friction along the way, for T/J (rad/s²) and delay (s) as known. Damping is left in friction: see the head of this
-    /// file. `share`: the ripple's size as a share of friction, or none, if this ride is to find it.
-    #[must_use]
-    pub fn told(&self, pull: f64, delay: f64, share: Option<f64>) -> Told {
-        let r = self.recording;
+    /// Friction as the mean voltage has it, V or 1/V.
+    fn rough(&self) -> f64 {
         let (begin, end) = self.ticks;
-        let volts = (begin..end).map(|i| r.ticks[i].volts).sum::<f64>() / (end - begin) as f64;
+        let ticks = &self.recording.ticks[begin..end];
+        let volts = ticks.iter().map(|tick| tick.volts).sum::<f64>() / (end - begin) as f64;
+        if self.recording.motor { volts.max(1e-6) } else { 1.0 / volts.max(1e-6) }
+    }
+
+    /// Root mean square by which its volts depart from their mean, as a share.
+    fn volts_vary(&self) -> f64 {
+        let ticks = &self.recording.ticks[self.ticks.0..self.ticks.1];
+        let n = ticks.len() as f64;
+        let mean = ticks.iter().map(|tick| tick.volts).sum::<f64>() / n;
+        let square = ticks.iter().map(|tick| (tick.volts - mean).powi(2)).sum::<f64>() / n;
+        square.sqrt() / mean.abs().max(1e-6)
+    }
+
+    /// Friction along the way, for T/J (rad/s²), delay (s) and the waves of the ripple as known. Damping is left in friction: see
+    /// the head of this file. `share`: the ripple's size as a share of friction, or none, if this ride is to find it.
+    #[must_use]
+    pub fn told(&self, pull: f64, delay: f64, waves: Waves, share: Option<f64>) -> Told {
+        let r = self.recording;
+        let begin = self.ticks.0;
         let motor = r.motor;
-        let mut friction = if motor { volts.max(1e-6) } else { 1.0 / volts.max(1e-6) };
+        let mut friction = self.rough();
         let mut size = share.unwrap_or(FIRST_SHARE);
         let rounds = if share.is_some() { 1 } else { ROUNDS };
         let mut worst = (begin, 0.0);
         let mut beliefs = Vec::new();
         for round in 0..rounds {
-            let shaft = shaft(r, pull, 0.0, size * friction);
+            let shaft = shaft(r, pull, 0.0, size * friction, waves.per_turn);
             let (passed, surprise) = self.pass(begin, &shaft, delay / r.period, friction);
             beliefs = smooth(&passed);
             worst = surprise;
@@ -213,19 +277,25 @@ impl Ride<'_> {
             (way + v, sum + v * (b.mean[2] + b.mean[3]))
         });
         let hold = if motor { sums.1 / sums.0 } else { sums.0 / sums.1 };
-        let radians = WAVES_PER_TURN * self.way();
+        let radians = waves.per_turn * self.way();
         let uneven = left_over(size, radians);
-        // Volts that follow the ripple, and a filter that sees a part of it, are off by its square.
-        let unseen = UNSEEN * size * size;
+        // `h ū + (mean of r u)` is 1: what the filter does not see of a ripple that the volts follow is taken for friction. A
+        // motor's friction does not act through the volts.
+        let unseen_square = beliefs.iter().fold(0.0, |sum, b| sum + b.mean[1].max(0.0) * b.spread[(3, 3)]);
+        let follow = if motor { 0.0 } else { UNSEEN * self.volts_vary() };
+        let unseen = follow * unseen_square / (sums.0 * size * friction * friction);
+        let slowest = beliefs.iter().map(|b| b.mean[1]).fold(f64::INFINITY, f64::min);
         Told {
             rate: self.rate,
+            slowest: slowest * r.radians_per_count() / (r.period * self.rate),
             sections: self.sections(&beliefs),
             hold: (hold, hold * (uneven * uneven + unseen * unseen + CLOCKWORK * CLOCKWORK).sqrt()),
             // Independent places: one for two radians of the wave.
             ripple: (size, size / (0.5 * radians).max(1.0).sqrt()),
+            waves,
             uneven: beliefs.iter().map(|b| (b.mean[3] / b.mean[2]).abs()).fold(0.0, f64::max),
             map: self.map(
-                &shaft_with(r, pull, 0.0, size * friction, (MAP_WAVE_DAMPING, MAP_WALK)),
+                &shaft_with(r, pull, 0.0, (size * friction, waves.per_turn), (MAP_WAVE_DAMPING, MAP_WALK)),
                 delay / r.period,
                 friction,
             ),
@@ -281,16 +351,14 @@ impl Ride<'_> {
         (out, (worst.0, f64::sqrt(worst.1)))
     }
 
-    /// Logarithm of the density of the edges, with friction as another ride has [found](Self::told) it, where a voltage takes effect over a way, rad.
+    /// Logarithm of the density of the edges, with friction known within a half, where a voltage takes effect over a way, rad.
     #[must_use]
-    pub fn density(&self, told: &Told, pull: f64, delay: f64, over: f64) -> f64 {
+    pub fn density(&self, shaft: &Shaft, delay: f64, friction: f64, over: f64) -> f64 {
         let r = self.recording;
         let (begin, end) = self.ticks;
         let origin = r.ticks[begin].counts;
         let rate = self.rate * r.period / r.radians_per_count();
-        let friction = 1.0 / told.hold.0;
-        let shaft = shaft(r, pull, 0.0, told.ripple.0 * friction);
-        let mut belief = Belief::new(&shaft, 0.5, (rate, rate), (friction, 0.5 * friction));
+        let mut belief = Belief::new(shaft, 0.5, (rate, rate), (friction, 0.5 * friction));
         let mut acts = r.ticks[begin].volts;
         let mut log = 0.0;
         for i in begin..end {
@@ -298,7 +366,7 @@ impl Ride<'_> {
             let way = belief.mean[1].max(0.0) * r.radians_per_count();
             let left = if over > 0.0 { libm::exp(-way / over) } else { 0.0 };
             acts = volts + (acts - volts) * left;
-            belief.advance(&shaft, acts, 1.0);
+            belief.advance(shaft, acts, 1.0);
             let (before, now) = (r.ticks[i].counts, r.ticks[i + 1].counts);
             if now > before {
                 log += belief.cross((now - origin) as f64, 0.5 * rate).density;

@@ -9,6 +9,8 @@ use toml::{Table, Value};
 
 /// Standard deviations of the ripple that friction's bounds hold.
 pub(crate) const RIPPLE: f64 = 3.0;
+/// More waves per turn than any encoder shows.
+const MOST_WAVES: f64 = 1e6;
 /// Largest tolerance that a scenario takes, %.
 pub(crate) const MOST_PERCENT: f64 = 99.9;
 
@@ -76,7 +78,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let file = Table::from_iter([
         ("model".to_owned(), Value::Table(model)),
         ("bounds".to_owned(), Value::Table(bounds)),
-        ("identified".to_owned(), Value::Table(intervals(&ROWS, report))),
+        ("identified".to_owned(), Value::Table(identified(&ROWS, report, report.waves))),
     ]);
     Ok(format!(
         "# Findings of `clutch identify` for: {}\n\
@@ -101,6 +103,8 @@ pub struct RigFile {
     pub delay: Option<Estimate>,
     /// Root mean square of friction's variation along the disc, as a share.
     pub ripple: Option<Estimate>,
+    /// Waves of that variation per turn.
+    pub waves: Option<f64>,
     /// Stribeck velocity, rad/s.
     pub stribeck: Option<Estimate>,
 }
@@ -143,11 +147,13 @@ impl RigFile {
                 |end: &str| row.get(end).and_then(Value::as_float).filter(|x| x.is_finite() && *x >= 0.0);
             Some(Estimate { value: end("value")?, low: end("low")?, high: end("high")? })
         };
+        let waves = file.get("identified").and_then(|identified| identified.get(RIPPLE_WAVES));
         Ok(RigFile {
             model: table("model")?,
             bounds: table("bounds")?,
             delay: told("delay_s"),
             ripple: told("ripple_rms"),
+            waves: waves.and_then(Value::as_float).filter(|waves| (1.0..=MOST_WAVES).contains(waves)),
             stribeck: told("stribeck_velocity_rad_s"),
         })
     }
@@ -171,8 +177,12 @@ impl RigFile {
     }
 }
 
-/// The intervals, each with the unit in its key.
-pub(crate) fn intervals<R>(rows: &[Row<R>], report: &R) -> Table {
+/// Key of the waves of the ripple per turn, where rides show them.
+const RIPPLE_WAVES: &str = "ripple_waves_per_turn";
+
+/// The intervals, each with the unit in its key, and the waves of the ripple.
+pub(crate) fn identified<R>(rows: &[Row<R>], report: &R, waves: Option<f64>) -> Table {
+    let waves = waves.map(|waves| (RIPPLE_WAVES.to_owned(), Value::Float(waves)));
     rows.iter()
         .map(|row| {
             let value = match row.finding(report) {
@@ -184,5 +194,6 @@ pub(crate) fn intervals<R>(rows: &[Row<R>], report: &R) -> Table {
             };
             (row.key.to_owned(), value)
         })
+        .chain(waves)
         .collect()
 }

@@ -6,8 +6,9 @@
 //! | bristles whose stiffness does not scale with the brake's force | rides: a voltage takes effect over a way, and so the later the slower the shaft |
 //! | a disc that is not square to its shaft | rides: friction differs from section to section of the turn |
 
+use crate::recording::Recording;
 use crate::release::{Apart, Fall, Unexplained};
-use crate::ride::{Ride, Told};
+use crate::ride::{Ride, Told, rides, section_rest, shaft};
 
 /// Ways over which a voltage may take effect, counts.
 const WAYS: [f64; 7] = [0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0];
@@ -60,7 +61,15 @@ pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<Stri
             let slow = stretches.iter().filter(|ride| ride.rate < SLOW);
             slow.map(|ride| {
                 let way = counts * ride.recording.radians_per_count();
-                ride.density(told, fall.pull.value, delay, way)
+                let friction = 1.0 / told.hold.0;
+                let shaft = shaft(
+                    ride.recording,
+                    fall.pull.value,
+                    0.0,
+                    told.ripple.0 * friction,
+                    told.waves.per_turn,
+                );
+                ride.density(&shaft, delay, friction, way)
             })
             .sum()
         };
@@ -79,6 +88,33 @@ pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<Stri
     ))
 }
 
+/// Rates of a ride on which glide sticks on no shaft of its model with an encoder that is fine enough, rad/s, and the least length and way
+/// of one that says something.
+const SURE: std::ops::RangeInclusive<f64> = 0.05..=0.2;
+const LONG_S: f64 = 3.0;
+const EDGES: usize = 200;
+
+/// The reason why friction is not determined, if a ride on which a law slides wherever friction is of its model shows no even motion.
+#[must_use]
+pub fn sticks(recordings: &[Recording]) -> Option<String> {
+    let stuck = |r: &&Recording| {
+        let moves = r.ticks.windows(2).filter(|w| w[1].counts > w[0].counts).count();
+        r.glides_at.is_some_and(|rate| SURE.contains(&rate))
+            && r.ticks.len() as f64 * r.period > LONG_S
+            && moves > EDGES
+            && rides(r).is_empty()
+    };
+    recordings.iter().find(stuck).map(|r| {
+        format!(
+            "{}: the shaft sticks at {:.0} °/s, where a law slides on any shaft of the model: a voltage may take effect over a way, by bristles \
+             that do not scale with the brake's force, or play of the pad, and faster rides then show another friction; a pad that is held more \
+             stiffly, or a finer encoder, shows friction",
+            r.name,
+            r.glides_at.unwrap_or_default().to_degrees()
+        )
+    })
+}
+
 /// Root mean square by which friction differs from section to section of the turn, as a share, if that is more than a ripple's
 /// rest.
 #[must_use]
@@ -90,8 +126,8 @@ pub fn runout(told: &[Told]) -> Option<f64> {
         (square / n.max(1.0)).sqrt()
     });
     let most = most.fold(0.0, f64::max);
-    let ripple = told.first()?.ripple.0;
-    (most > (EXCEEDED * crate::ride::section_rest(ripple)).max(LEAST_RUNOUT)).then_some(most)
+    let slow = told.first()?;
+    (most > (EXCEEDED * section_rest(slow.ripple.0, slow.waves.per_turn)).max(LEAST_RUNOUT)).then_some(most)
 }
 
 /// The share that a run-out leaves in the mean over a way, rad, for one wave in a turn and for two.

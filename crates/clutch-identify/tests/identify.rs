@@ -1,14 +1,17 @@
 //! Estimates of shafts that the estimators know nothing of, and refusals.
 
-use clutch_identify::experiment::{PartRunner, Programme, experiment};
+use clutch_identify::experiment::{PartRunner, Programme, experiment, remedy};
+use clutch_identify::recording::Scale;
 use clutch_identify::release::{fall, releases};
-use clutch_identify::{DAMPINGS, Finding, Recording, Report, Tick, identify};
+use clutch_identify::rig_file::rig_file;
+use clutch_identify::{DAMPINGS, Finding, Recorded, Recording, Report, RigFile, believed, identify};
 use clutch_sim::Scenario;
 
 #[path = "../examples/random_rig/mod.rs"]
 #[allow(dead_code, reason = "its motors are of other tests")]
 mod random_rig;
 use random_rig::unlike::{Unlike, recordings as unlike};
+use random_rig::waves;
 
 /// A rig that is not as the scenario's model has it: T/J, v_hold, μ_s/μ_d, C/J follow.
 const RIG: &str = r#"
@@ -108,6 +111,75 @@ fn an_encoder_that_sees_no_short_wave_is_enough() {
     assert!((told - hold).abs() < 0.003 * hold, "{told} for {hold}");
 }
 
+/// Ripples of one wave that the law glide does not believe in; on a disc of 900 the shaft nearly stops at 5 °/s.
+#[test]
+fn a_ripple_of_other_waves_is_seen_as_what_it_is() {
+    let torque = 0.2094 * 9.81 * 0.024;
+    let hold = torque / (0.118 * 0.14);
+    for (n, ripple) in [(30, "0.14"), (650, "0.1"), (900, "0.12")] {
+        let keys = waves(n, n, n);
+        let mut set: Vec<(&str, &str)> = keys.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+        set.push(("rig.ripple.rms", ripple));
+        let report = identify(&recordings(&set));
+        assert_known(&report.hold, hold, 0.01 * hold);
+        assert_known(&report.damping, 0.0021 / 0.0014, 0.3);
+        assert_known(&report.pull, torque / 0.0014, 0.01 * torque / 0.0014);
+        the_believed_disc_has_these_waves(&report, n);
+        assert_eq!(report.unexplained.is_empty(), n != 900, "{:?}", report.unexplained);
+        if n == 900 {
+            assert!(
+                report.unexplained[0].contains("ride_5: the shaft nearly stops"),
+                "{:?}",
+                report.unexplained
+            );
+            assert_eq!(report.found.2.len(), 2, "{:?}", report.found);
+        }
+    }
+}
+
+fn the_believed_disc_has_these_waves(report: &Report, n: u32) {
+    // Four steps to the octave.
+    let near = |waves: f64| (waves / f64::from(n)).log2().abs() < 0.25;
+    assert!(report.waves.is_some_and(near), "{:?} for {n}", report.waves);
+    let scenario = Scenario::parse("rig", RIG, &[]).unwrap();
+    let file = RigFile::parse("rig.toml", &rig_file(report, &scenario).unwrap()).unwrap();
+    assert_eq!(file.waves, report.waves);
+    let ripple = believed(&scenario, Some(&file)).unwrap().scenario.spec().rig.ripple.expect("a ripple");
+    let number = (ripple.highest - ripple.lowest) / ripple.spacing + 1;
+    assert!(near(0.5 * f64::from(ripple.lowest + ripple.highest)) && number == 4, "{ripple:?}");
+}
+
+/// Between two delays that are tried a shaft goes on by counts of a fine encoder.
+#[test]
+fn a_steady_torque_is_one_under_a_fine_encoder() {
+    let torque = 0.2094 * 9.81 * 0.024;
+    for counts in ["65536", "200000"] {
+        let all = recordings(&[("rig.encoder.counts_per_rev", counts)]);
+        let report = of(&all, &["releases"]);
+        assert_known(&report.pull, torque / 0.0014, 0.003 * torque / 0.0014);
+        assert_known(&report.delay, 1e-3, 0.05e-3);
+    }
+}
+
+#[test]
+fn a_coarse_encoder_under_a_narrow_jump_is_part_of_the_remedy() {
+    let with = |counts: &str| {
+        let set = [("rig.encoder.counts_per_rev".to_owned(), counts.to_owned())];
+        remedy(&Scenario::parse("rig", RIG, &set).unwrap())
+    };
+    let said = "safety.limits.jump_deg = 0.15 is 1.7 counts of this encoder";
+    assert!(with("4096").contains(said) && with("4096").ends_with("as 0.27"), "{}", with("4096"));
+    assert!(!with("20000").contains("jump_deg"), "{}", with("20000"));
+}
+
+/// Steps of the converter are no ripple.
+#[test]
+fn an_even_disc_may_have_none() {
+    let report = identify(&recordings(&[("rig.ripple.rms", "0.0")]));
+    let ripple = report.ripple.known().expect("rides");
+    assert!(ripple.holds(0.0) && ripple.high < 0.02, "{ripple:?}");
+}
+
 #[test]
 fn a_count_that_no_fall_explains_is_named() {
     let all = recordings(&[]);
@@ -153,15 +225,20 @@ fn a_rig_that_is_unlike_the_model_is_refused_with_its_cause_and_the_experiment_t
 
 #[test]
 fn tables_of_others_are_read_and_their_mistakes_named() {
-    let scale = (0.001, 20_000, false);
-    let read = |text: &str| Recording::from_csv("t.csv", text, ("n", "u"), scale);
+    let scale = Scale { period: 0.001, counts_per_rev: 20_000, motor: false, volts: (-1.0, 11.0) };
+    let read = |text: &str| Recording::from_csv("t.csv", text, ("n", "u"), &scale);
     let good = read("t,n,u\n0,0,4.5\n1,1,4.5\n2,3,4.4\n").unwrap();
-    assert_eq!(good.ticks[2], Tick { counts: 3, volts: 4.4 });
+    assert_eq!(good.ticks[2], Recorded { counts: 3, volts: 4.4 });
     assert!((good.step_volts - 0.1).abs() < 1e-12);
     for (text, said) in [
         ("t,m,u\n0,0,4.5\n", "t.csv: has no column \"n\": expected one of: t, m, u"),
         ("n,u\n0,4.5\n0.5,4.5\n", "t.csv: line 3: counts = 0.5: expected a whole number of counts"),
         ("n,u\n0,4.5\n1,high\n", "t.csv: line 3, column \"u\" = \"high\": expected a number"),
+        (
+            "n,u\n0,4.5\n1,4500\n",
+            "t.csv: line 3, column \"u\" = 4500: expected volts within output.lowest_v and output.highest_v of the scenario, and not far \
+             beyond: -1 to 11",
+        ),
         ("n,u\n0,inf\n", "t.csv: line 2, column \"u\" = \"inf\": expected a number"),
         ("n,u\n0,4.5\n", "t.csv: has no samples under control"),
         (
@@ -187,7 +264,7 @@ fn nothing_panics_on_recordings_that_make_no_sense() {
             let ticks = (0..n).map(|_| {
                 counts += rng.random_range(-2..=40_i64) * i64::from(rng.random_bool(0.3));
                 let volts = [0.0, 2.0, -1.0, rng.random_range(-10.0..10.0)][rng.random_range(0..4)];
-                Tick { counts, volts }
+                Recorded { counts, volts }
             });
             let ticks = ticks.collect();
             let recording = Recording {
@@ -197,6 +274,7 @@ fn nothing_panics_on_recordings_that_make_no_sense() {
                 counts_per_rev: 20_000,
                 step_volts: 0.005,
                 volts_before: 3.0,
+                glides_at: None,
                 first_tick: 0,
                 ticks,
             };

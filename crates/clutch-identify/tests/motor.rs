@@ -9,7 +9,8 @@ use clutch_sim::Scenario;
 #[path = "../examples/random_rig/mod.rs"]
 #[allow(dead_code, reason = "its brakes are of other tests")]
 mod random_rig;
-use random_rig::motor::{Truth, truth};
+use random_rig::motor::{Truth, truth, truth_with};
+use random_rig::waves;
 
 fn recordings(truth: &Truth) -> Vec<Recording> {
     let experiment = Experiment::of(&truth.scenario, &Consent::default()).unwrap();
@@ -31,6 +32,14 @@ fn known(finding: &Finding, truth: f64, within: f64) -> Estimate {
     e
 }
 
+/// Both ways, at rest and sliding, within these shares of the truth.
+fn friction_is_known(truth: &Truth, report: &Report, (at_rest, sliding): (f64, f64)) {
+    for (way, load) in [(0, -truth.load), (1, truth.load)] {
+        let _ = known(&report.at_rest[way], truth.at_rest + load, at_rest * truth.at_rest);
+        let _ = known(&report.sliding[way], truth.sliding + load, sliding * truth.sliding);
+    }
+}
+
 fn refusal(finding: &Finding) -> &str {
     match finding {
         Finding::Refused(why) => why,
@@ -45,10 +54,7 @@ fn hidden_axes_are_found_and_what_a_log_does_not_show_is_refused() {
         let truth = truth(seed).unwrap();
         let all = recordings(&truth);
         let report = of(&all);
-        for (way, load) in [(0, -truth.load), (1, truth.load)] {
-            let _ = known(&report.at_rest[way], truth.at_rest + load, 0.03 * truth.at_rest);
-            let _ = known(&report.sliding[way], truth.sliding + load, 0.01 * truth.sliding);
-        }
+        friction_is_known(&truth, &report, (0.03, 0.01));
         let _ = known(&report.load, truth.load, 0.003);
         let _ = known(&report.viscous, truth.viscous, 0.006);
         let _ = known(&report.inertia, truth.inertia, 0.03 * truth.inertia);
@@ -59,6 +65,24 @@ fn hidden_axes_are_found_and_what_a_log_does_not_show_is_refused() {
         the_map_is_the_discs(&truth, &report);
         the_file_holds_the_rig(&truth, &report);
         parts_tell_what_they_can(&all);
+    }
+}
+
+/// Of a wave as long as the crawl's way no pass knows what is mean there.
+#[test]
+fn cogging_of_other_waves_is_seen_as_what_it_is() {
+    for n in [32, 700] {
+        let truth = truth_with(10_001, &waves(n, n, n)).unwrap();
+        let report = of(&recordings(&truth));
+        friction_is_known(&truth, &report, (0.04, 0.02));
+        assert!(
+            report.waves.is_some_and(|waves| (waves / f64::from(n)).log2().abs() < 0.25),
+            "{:?}",
+            report.waves
+        );
+        let _ = known(&report.load, truth.load, 0.01);
+        let _ = known(&report.viscous, truth.viscous, 0.015);
+        let _ = known(&report.inertia, truth.inertia, 0.03 * truth.inertia);
     }
 }
 
@@ -174,7 +198,7 @@ fn limits_are_held_and_bad_ones_named() {
 
 #[test]
 fn nothing_panics_on_recordings_that_make_no_sense() {
-    use clutch_identify::Tick;
+    use clutch_identify::Recorded;
     use rand::{RngExt, SeedableRng};
     let mut rng = rand_pcg::Pcg64::seed_from_u64(6);
     for n in [2_usize, 3, 50, 3000] {
@@ -183,7 +207,7 @@ fn nothing_panics_on_recordings_that_make_no_sense() {
             let ticks = (0..n).map(|_| {
                 counts += rng.random_range(-20..=20_i64) * i64::from(rng.random_bool(0.3));
                 let volts = [0.0, 2.0, -1.0, rng.random_range(-10.0..10.0)][rng.random_range(0..4)];
-                Tick { counts, volts }
+                Recorded { counts, volts }
             });
             let recording = Recording {
                 name: "noise".to_owned(),
@@ -192,6 +216,7 @@ fn nothing_panics_on_recordings_that_make_no_sense() {
                 counts_per_rev: 20_000,
                 step_volts: 0.005,
                 volts_before: 3.0,
+                glides_at: None,
                 first_tick: 0,
                 ticks: ticks.collect(),
             };

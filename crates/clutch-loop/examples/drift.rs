@@ -271,7 +271,9 @@ fn healthy(drawn: u64) -> Outcome<()> {
     }
     groups.push(motors);
 
-    println!("| shafts | runs | hours | windows | could not tell below | not told | false alarms |");
+    println!(
+        "| shafts | runs | hours | windows | without an upper end | runs without a window | false alarms |"
+    );
     println!("|---|---|---|---|---|---|---|");
     let mut sum = [0.0; 6];
     for group in &groups {

@@ -3,7 +3,7 @@
 use crate::from_scenario;
 use clutch_core::ActuatorKind;
 use clutch_core::reference::ReferenceParams;
-use clutch_sim::scenario::{CERTIFIED, CertificateError, Plan, Proven, STICKS, Sampled};
+use clutch_sim::scenario::{CertificateError, Plan, Proven, Sampled};
 use clutch_sim::{Scenario, ScenarioError, Start, number};
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub enum ClearanceError {
     NotCertified {
         /// The scenario's name.
         scenario: String,
-        /// What is missing.
+        /// The missing part.
         lack: Lack,
     },
     /// The sampled loop's certificate is none of this scenario's.
@@ -40,7 +40,7 @@ pub enum ClearanceError {
     },
 }
 
-/// What keeps gains from a board.
+/// The part that keeps gains from a board.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Lack {
     /// No certificate in continuous time, and none of the sampled loop was given.
@@ -72,22 +72,13 @@ impl Cleared {
     /// The verdict on the error of the sampled loop with its scope, for log and summary.
     #[must_use]
     pub fn bound_line(&self) -> String {
-        match &self.proven {
-            Some(proven) => self.sampled.bound_line(proven),
-            None => "the bound of the error is uncertified: no certificate was given".to_owned(),
-        }
+        self.sampled.bound_if_any(self.proven.as_ref())
     }
 
     /// The verdicts, each by its name in a log.
     #[must_use]
     pub fn verdicts(&self) -> [(String, String); 4] {
-        [
-            (CERTIFIED, self.plan.certificate.certified().to_string()),
-            ("as_sampled", self.bound_line()),
-            ("linear_stability", self.sampled.stability_line()),
-            ("sticks", STICKS.to_owned()),
-        ]
-        .map(|(name, verdict)| (name.to_owned(), verdict))
+        self.sampled.verdicts(self.plan.certificate.certified(), self.proven.as_ref())
     }
 
     /// Remarks on limits of the supervisor that a sound shaft will meet with this law and path.
@@ -161,7 +152,7 @@ impl Admitted {
         &self.scenario
     }
 
-    /// What is known of it.
+    /// Verdicts on it.
     #[must_use]
     pub fn cleared(&self) -> &Cleared {
         &self.cleared
@@ -175,7 +166,7 @@ impl Admitted {
 }
 
 impl Lack {
-    /// What keeps a scenario from a board; none if nothing does.
+    /// The reason that keeps a scenario from a board; none if nothing does.
     fn of(plan: &Plan, sampled: &Sampled, proven: bool) -> Option<Self> {
         if let Some(radius) = sampled.radius().filter(|_| sampled.runs_away()) {
             return Some(Lack::Unstable(radius));

@@ -50,7 +50,7 @@ clutch_core::words! {
     /// The effect of a drift out of the bounds.
     pub enum OnDrift {
         /// It is reported and logged, and the run goes on.
-        Tell = "tell" default,
+        Report = "report" default,
         /// It ends the run in the safe state, as an operator would.
         Stop = "stop",
     }

@@ -138,6 +138,12 @@ impl FaultKind {
     /// whose clock waits for its controller would hide such a fault.
     #[must_use]
     pub fn silences(self) -> bool {
+        self.of_the_line() || self == FaultKind::Reset
+    }
+
+    /// True if it hits frames, which go one way or the other.
+    #[must_use]
+    pub fn of_the_line(self) -> bool {
         match self {
             FaultKind::Drop
             | FaultKind::Duplicate
@@ -147,8 +153,7 @@ impl FaultKind {
             | FaultKind::Reorder
             | FaultKind::Silence
             | FaultKind::Lie(_)
-            | FaultKind::Forged(_)
-            | FaultKind::Reset => true,
+            | FaultKind::Forged(_) => true,
             FaultKind::EncoderFreeze
             | FaultKind::EncoderJump(_)
             | FaultKind::EncoderChannel(_)
@@ -160,7 +165,8 @@ impl FaultKind {
             | FaultKind::Lever
             | FaultKind::Clock(_)
             | FaultKind::Prescaler(_)
-            | FaultKind::Crystal(_) => false,
+            | FaultKind::Crystal(_)
+            | FaultKind::Reset => false,
         }
     }
 }
@@ -267,6 +273,9 @@ fn read(kind: &str, keys: &str) -> Result<Fault, String> {
     let kind_of_fault = given.kind(kind)?;
     if given.any_left() {
         return Err(format!("a key that {kind} does not have"));
+    }
+    if seen.contains(&"way") && !kind_of_fault.of_the_line() {
+        return Err(format!("way: {kind} is in the board, and has none: faults of the line have"));
     }
     if !given.when {
         return Err("neither at nor p is given".to_owned());
@@ -502,6 +511,8 @@ mod tests {
         assert_eq!(fault.to_string(), "delay of 5 ms, p = 0.5, from the board, for 0.1 s, from 1 s");
         let stuck: Fault = "dac-stuck:at=1,volts=last".parse().unwrap();
         assert_eq!(stuck.kind, FaultKind::DacStuck(StuckAt::Last));
+        let e = "freeze:at=1,way=up".parse::<Fault>().unwrap_err();
+        assert!(e.problem.starts_with("way: freeze is in the board, and has none"), "{e}");
     }
 
     #[test]

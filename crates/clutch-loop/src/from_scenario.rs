@@ -89,9 +89,9 @@ impl<T: Real> BuiltRun<T> {
         let cycles = |n: u32| Micros(spec.period.0.saturating_mul(n));
         Ok(BuiltRun {
             params: servo_params,
-            servo: Servo::new(&servo_params).map_err(|e| e.cast())?,
+            servo: Servo::new(&servo_params).map_err(|e| scenario.refused_in_single(&e))?,
             supervisor: Supervisor::new(&limits, &servo_params, &bounds)
-                .map_err(|e| e.cast())?
+                .map_err(|e| scenario.refused_in_single(&e))?
                 .with_checks(checks),
             controller: ControllerParams {
                 run,
@@ -249,8 +249,8 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
         let watchdog = u64::from(safety.limits.watchdog_cycles) * u64::from(period);
         if watchdog > u64::from(hello.watchdog_max_us) {
             lines.push(format!(
-                "watchdog: the board's reaches {} µs, the scenario asks for {watchdog} µs",
-                hello.watchdog_max_us
+                "watchdog: the board's reaches {} µs, the scenario asks for {watchdog} µs (safety.limits.watchdog_cycles = {})",
+                hello.watchdog_max_us, safety.limits.watchdog_cycles
             ));
         }
     }
@@ -307,6 +307,27 @@ mod tests {
         for name in ["minimum_jerk", "smc_2"] {
             same_targets::<f32>(name);
             same_targets::<f64>(name);
+        }
+    }
+
+    /// Rounded to single precision an angle of a count is less than one.
+    #[test]
+    fn a_supervisor_that_single_precision_refuses_is_refused_by_its_key() {
+        let base = Scenario::text("board_smc_2".as_ref()).unwrap().1;
+        for (counts, deg) in [("3600", "0.1"), ("14400", "0.025"), ("36000", "0.01")] {
+            let set = [("rig.encoder.counts_per_rev", counts), ("safety.limits.jump_deg", deg)];
+            let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let scenario = Scenario::parse("small", &base, &set).unwrap();
+            BuiltRun::<f64>::new(&scenario, 1).unwrap();
+            let Err(BuildError::Scenario(error)) = BuiltRun::<f32>::new(&scenario, 1) else {
+                panic!("{counts}, {deg}")
+            };
+            assert_eq!(
+                (error.key.as_str(), error.value.as_str()),
+                ("safety.limits.jump_deg", deg),
+                "{error}"
+            );
+            assert!(error.message.ends_with("in single precision (sampling.scalar = \"f32\")"), "{error}");
         }
     }
 }

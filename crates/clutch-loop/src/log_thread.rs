@@ -73,7 +73,7 @@ impl LogThread {
     /// Ends the log of a run that never began, and removes its file; the ring has to be gone.
     pub fn discard(self) {
         let path = self.path.clone();
-        // What it says of its end is of no use any more.
+        // Nobody needs its own word on its end any more.
         let _ = self.finish();
         let _ = std::fs::remove_file(path);
     }

@@ -53,7 +53,7 @@ pub struct Summary {
     pub scenario: String,
     /// Version and commit of the build.
     pub version: String,
-    /// What is known of the gains.
+    /// Verdicts on the gains.
     pub cleared: Cleared,
     /// The file of the sampled loop's certificate, if one was given.
     pub certificate: Option<PathBuf>,

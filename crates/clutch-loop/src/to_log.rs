@@ -220,6 +220,10 @@ fn simulation<'a, T: Real>(
         header.extra.push((FOREIGN_LAW.to_owned(), name.to_owned()));
         header.term_names = run.trace.terms.iter().map(|(name, _)| (*name).to_owned()).collect();
         (header.law_hash, header.scalar) = (0, "f64".to_owned());
+    } else if let Ok(plan) = scenario.plan() {
+        // As a loop's; a path that no plan takes has none.
+        let sampled = scenario.sampled(&plan.bounds);
+        header.extra.extend(sampled.verdicts(plan.certificate.certified(), None));
     }
     Ok((header, of_simulation(run, *servo.dac(), servo.encoder().radians_per_count(), spec.period)))
 }

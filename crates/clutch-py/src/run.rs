@@ -3,7 +3,7 @@
 use crate::convert::{core_error, from_json, os_error};
 use crate::scenario::Scenario;
 use crate::stepping::{PythonLaw, event_table, native};
-use crate::table::{Column, Table};
+use crate::table::{Column, InColumn, Table};
 use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
 use clutch_loop::to_log::{SaveError, save_simulation};
@@ -12,8 +12,9 @@ use clutch_sim::metrics::columns;
 use clutch_sim::picture::{Around, Envelope, PARTS, Stick, Window, sticks};
 use clutch_sim::progress::Progress;
 use clutch_sim::rig::Rig;
+use clutch_sim::run::Trace;
 use clutch_sim::smooth_speed::{self, Trials};
-use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
+use clutch_sim::{Keep, RunError, SAMPLE_COLUMNS, SampleColumn, ScenarioError, Values, simulate_servo};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::{PyFileExistsError, PyRuntimeError, PyUserWarning};
 use pyo3::prelude::*;
@@ -156,28 +157,24 @@ pub(crate) fn window_parts(window: &Window) -> (f64, f64, String, bool) {
 
 /// Samples as columns, the memory shared with the run.
 pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
-    let limit = Column::own(run.trace.limit.iter().map(|l| *l as u16).collect::<Vec<u16>>());
-    let mut columns: Vec<(String, Column)> = vec![
-        ("time_s".into(), Column::part(run, |r| &r.trace.time)),
-        ("target_position_rad".into(), Column::part(run, |r| &r.trace.target_position)),
-        ("target_velocity_rad_s".into(), Column::part(run, |r| &r.trace.target_velocity)),
-        ("target_acceleration_rad_s2".into(), Column::part(run, |r| &r.trace.target_acceleration)),
-        ("position_rad".into(), Column::part(run, |r| &r.trace.position)),
-        ("velocity_rad_s".into(), Column::part(run, |r| &r.trace.velocity)),
-        ("error_rad".into(), Column::part(run, |r| &r.trace.error)),
-        ("counts".into(), Column::part(run, |r| &r.trace.counts)),
-        ("measured_error_rad".into(), Column::part(run, |r| &r.trace.measured_error)),
-        ("error_rate_rad_s".into(), Column::part(run, |r| &r.trace.error_rate)),
-        ("code".into(), Column::part(run, |r| &r.trace.code)),
-        ("voltage_v".into(), Column::part(run, |r| &r.trace.voltage)),
-        ("demand_v".into(), Column::part(run, |r| &r.trace.demand)),
-        ("limit".into(), limit),
-        ("stuck".into(), Column::part(run, |r| &r.trace.stuck)),
-    ];
+    fn part<T: InColumn>(run: &Arc<clutch_sim::Run>, of: impl FnOnce(&Trace) -> Option<&[T]>) -> Column {
+        Column::part(run, |r| of(&r.trace).unwrap_or_default())
+    }
+    let column = |column: &SampleColumn| {
+        let of = column.values;
+        match of(&run.trace) {
+            Values::Real(_) => part(run, |t| if let Values::Real(x) = of(t) { Some(x) } else { None }),
+            Values::Counts(_) => part(run, |t| if let Values::Counts(x) = of(t) { Some(x) } else { None }),
+            Values::Codes(_) => part(run, |t| if let Values::Codes(x) = of(t) { Some(x) } else { None }),
+            Values::Flags(_) => part(run, |t| if let Values::Flags(x) = of(t) { Some(x) } else { None }),
+            Values::Limits(x) => Column::own(x.iter().map(|l| *l as u16).collect::<Vec<u16>>()),
+        }
+    };
+    let mut columns: Vec<(String, Column)> =
+        SAMPLE_COLUMNS.iter().map(|one| (one.name.to_owned(), column(one))).collect();
     for (i, (name, _)) in run.trace.term_columns().enumerate() {
         columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
     }
-    debug_assert!(columns.iter().zip(clutch_sim::SAMPLE_COLUMNS).all(|((ours, _), (name, _))| ours == name));
     columns
 }
 
@@ -186,7 +183,8 @@ impl Run {
     /// A row for each sample.
     #[getter]
     fn samples(&self) -> Table {
-        Table::of(sample_columns(&self.run)).meaning(clutch_sim::SAMPLE_COLUMNS)
+        Table::of(sample_columns(&self.run))
+            .meaning(SAMPLE_COLUMNS.iter().map(|column| (column.name, column.meaning)))
     }
 
     /// Sticks and break-aways.

@@ -140,6 +140,13 @@ impl Scenario {
         Path::new(py, &self.0, |e| self.error(py, &self.0.run_error(&e.into())))
     }
 
+    /// Slope, 1/s, and layer, rad/s, of the sliding surface of law or shell; none of a law without one, or of a path that cannot be
+    /// followed.
+    fn surface(&self) -> Option<(f64, f64)> {
+        let certificate = self.0.plan().ok()?.certificate;
+        (certificate.slope > 0.0).then_some((certificate.slope, certificate.layer))
+    }
+
     /// The meaning of a dotted key, in a few words; none of one that is no parameter.
     fn meaning(&self, key: &str) -> Option<String> {
         Some(self.0.meaning(key)?.trim_end_matches('.').to_owned())

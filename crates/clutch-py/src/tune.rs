@@ -4,10 +4,9 @@ use crate::background::in_background;
 use crate::convert::{from_json, log_error, loop_error, os_error, scenario_error};
 use crate::log::read_unless_interrupted;
 use crate::stepping::native;
-use clutch_core::ActuatorKind;
 use clutch_identify::added::Added;
 use clutch_identify::experiment::{ExperimentError, PartRunner, folder_for_logs};
-use clutch_identify::recording::{MOST_TABLE_MIB, ReadError};
+use clutch_identify::recording::{MOST_TABLE_MIB, ReadError, Scale};
 use clutch_identify::shown::{MOTOR_ROWS, ROWS};
 use clutch_identify::{Consent, Experiment, Identified, Recording, RigFile, believed};
 use clutch_log::LogError;
@@ -32,7 +31,11 @@ fn experiment_error(py: Python<'_>, e: &ExperimentError) -> PyErr {
         ExperimentError::Scenario(e) => scenario_error(py, e, None),
         ExperimentError::Read(e) => read_error(py, e),
         ExperimentError::Log(e) => log_error(py, e),
-        ExperimentError::Limit { .. } | ExperimentError::OfMotors(_) => PyValueError::new_err(e.to_string()),
+        // The message begins with the limit, which is an argument here.
+        ExperimentError::Limit { key, .. } | ExperimentError::OfMotors(key) => {
+            let argument = if *key == "travel" { "travel_deg" } else { "fastest_deg_s" };
+            PyValueError::new_err(e.to_string().replacen(key, argument, 1))
+        }
         _ => loop_error(py, &e.to_string()),
     }
 }
@@ -50,10 +53,7 @@ fn read(
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
             let text = read_text_up_to(path, MOST_TABLE_MIB)
                 .map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
-            let spec = scenario.spec();
-            let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
-            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);
-            let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
+            let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), &Scale::of(scenario));
             recordings.push(read.map_err(|e| read_error(py, &e))?);
         } else {
             let whole = read_unless_interrupted(py, path)?;
@@ -130,19 +130,17 @@ pub(crate) fn identified_rows() -> Vec<(&'static str, &'static str, &'static str
     brake.chain(also).collect()
 }
 
-/// A rig file that was made by this package.
-fn rig(text: Option<&str>) -> PyResult<Option<RigFile>> {
-    text.map(|text| RigFile::parse("identified", text))
-        .transpose()
-        .map_err(|e| PyValueError::new_err(e.to_string()))
+/// A rig file of that name.
+fn rig((name, text): (&str, &str)) -> PyResult<RigFile> {
+    RigFile::parse(name, text).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
 /// The scenario with the rig that it believes in, as TOML.
 #[pyfunction]
 pub(crate) fn as_identified(py: Python<'_>, scenario: &Bound<'_, PyAny>, file: &str) -> PyResult<String> {
     let scenario = native(scenario)?;
-    let rig = rig(Some(file))?;
-    let found = py.detach(|| believed(&scenario.0, rig.as_ref()));
+    let rig = rig(("identified", file))?;
+    let found = py.detach(|| believed(&scenario.0, Some(&rig)));
     Ok(found.map_err(|e| scenario_error(py, &e, None))?.scenario.canonical())
 }
 
@@ -155,13 +153,13 @@ type Found<'py> = (Bound<'py, PyAny>, Vec<Option<String>>, String, Option<String
 pub(crate) fn tune<'py>(
     py: Python<'py>,
     scenario: &Bound<'py, PyAny>,
-    file: Option<&str>,
+    file: Option<(String, String)>,
     rates_deg_s: Vec<f64>,
     candidates: u32,
     uncertified: bool,
 ) -> PyResult<Found<'py>> {
     let scenario = native(scenario)?;
-    let rig = rig(file)?;
+    let rig = file.map(|(name, text)| rig((&name, &text))).transpose()?;
     let options = Options { rates_deg_s, candidates, uncertified };
     let work = |stop: &AtomicBool| {
         let go_on =

@@ -1,8 +1,8 @@
 //! Moves a shaft over single intervals, read from the input line by line, by the engine that is named: what a referee
 //! outside of this project compares with its own solution. `python/tests/intervals.py` is one.
 //!
-//! A line is `J C mu_s mu_d v_s torque volts K_COF velocity seconds`, in SI, and for the engine of bristles, whose friction
-//! is LuGre's, `sigma_0 sigma_1` besides; the answer is `position velocity` and the instants of the events, `+` for a
+//! A line is `J C mu_s mu_d v_s torque volts K_COF velocity seconds`, in SI, and besides Stribeck's exponent where that is not 1, or for
+//! the engine of bristles, whose friction is LuGre's, `sigma_0 sigma_1`; the answer is `position velocity` and the instants of the events, `+` for a
 //! break-away and `-` for a stick, or the error in words. `system` is the motion of a system of one inertia and one row.
 
 use clutch_core::friction::LugreParams;
@@ -114,21 +114,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             brake_gain,
             velocity,
             seconds,
-            ref bristles @ ..,
+            ref more @ ..,
         ] = numbers[..]
         else {
             return Err(format!("{} numbers: expected at least 10", numbers.len()).into());
         };
         let pushed = Pushed { inertia, damping, torque, volts, brake_gain };
-        let stribeck_exponent = 1.0;
+        let stribeck_exponent = if let [exponent] = more[..] { exponent } else { 1.0 };
         let curve = StribeckParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent };
         let curve = FrictionParams::from(curve);
-        let moved = match (name.as_str(), bristles) {
+        let moved = match (name.as_str(), more) {
             ("exact_flow", []) => by_shaft(&mut ExactFlow, &pushed, curve, velocity, seconds),
-            ("dormand_prince", []) => {
+            ("dormand_prince", [] | [_]) => {
                 by_shaft(&mut DormandPrince::default(), &pushed, curve, velocity, seconds)
             }
-            ("system", []) => by_system(&pushed, &curve, velocity, seconds),
+            ("system", [] | [_]) => by_system(&pushed, &curve, velocity, seconds),
             ("bristle", &[stiffness, damping]) => {
                 let lugre = LugreParams {
                     mu_static,
@@ -140,7 +140,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 };
                 by_shaft(&mut Bristle::default(), &pushed, lugre.into(), velocity, seconds)
             }
-            _ => return Err(format!("{} numbers: expected 10, with bristles 12", numbers.len()).into()),
+            _ => {
+                return Err(format!(
+                    "{} numbers: expected 10, with an exponent 11, with bristles 12",
+                    numbers.len()
+                )
+                .into());
+            }
         };
         match moved {
             Err(error) => writeln!(out, "error {error}")?,

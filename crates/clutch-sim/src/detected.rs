@@ -140,7 +140,7 @@ impl Detector {
             self.before = (self.silent.cycles(), self.silent.stuck_ticks(), self.climbing.cycles());
             self.unheard = if self.silent.stuck() { 0 } else { silent };
         } else if begins {
-            // What was silent before settling has been added with the rest.
+            // The silence before settling has been added with the rest.
             self.before.1 += std::mem::take(&mut self.unheard);
         } else if silent == 0 {
             self.unheard = 0;

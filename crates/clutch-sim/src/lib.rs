@@ -41,9 +41,9 @@ pub use moving_rig::MovingRig;
 pub use number::number;
 pub use rig::RigParams;
 pub use run::{
-    Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_prepared,
-    simulate_servo,
+    Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, SampleColumn, Start, Values, simulate,
+    simulate_prepared, simulate_servo,
 };
 pub use scenario::Scenario;
 pub use scenario_error::ScenarioError;
-pub use tables::{Points, Text, expected, nearest};
+pub use tables::{Points, Text, expected, nearest, written};

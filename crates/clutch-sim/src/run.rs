@@ -57,33 +57,65 @@ pub struct Trace {
     pub terms: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// Columns of a table of samples, beside those of the law's terms, with their meanings.
-pub const SAMPLE_COLUMNS: [(&str, &str); 15] = [
-    ("time_s", "time of the sample"),
-    ("target_position_rad", "target position, from the encoder's zero"),
-    ("target_velocity_rad_s", "target velocity"),
-    ("target_acceleration_rad_s2", "target acceleration"),
-    ("position_rad", "true position"),
-    ("velocity_rad_s", "true velocity; exactly 0 when stuck"),
-    ("error_rad", "true error, target less position"),
-    ("counts", "the encoder's counts"),
-    ("measured_error_rad", "error as the law saw it"),
-    ("error_rate_rad_s", "rate of the error as the law saw it"),
-    ("code", "code given to the converter"),
-    ("voltage_v", "voltage commanded at this sample, before delay and lag"),
-    ("demand_v", "the law's answer, before the converter"),
-    (
-        "limit",
-        "limit of the output that decided it: 0 none, 1 the lowest, 2 the highest, 3 the demand was no number",
-    ),
-    ("stuck", "the shaft is stuck at the sample"),
-];
+/// A column of a table of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleColumn {
+    /// Its name, with its unit.
+    pub name: &'static str,
+    /// Its meaning.
+    pub meaning: &'static str,
+    /// Its values, of a run's samples.
+    pub values: fn(&Trace) -> Values<'_>,
+}
+
+/// Values of a column of samples.
+#[derive(Clone, Copy, Debug)]
+pub enum Values<'a> {
+    /// Real numbers.
+    Real(&'a [f64]),
+    /// Counts of the encoder.
+    Counts(&'a [i32]),
+    /// Codes of the converter.
+    Codes(&'a [u16]),
+    /// Limits of the output, as numbers.
+    Limits(&'a [Limit]),
+    /// True or not.
+    Flags(&'a [bool]),
+}
+
+macro_rules! sample_columns {
+    ($($name:literal $meaning:literal $kind:ident $field:ident;)+) => {
+        /// Columns of a table of samples, beside those of the law's terms.
+        pub const SAMPLE_COLUMNS: &[SampleColumn] = &[$(SampleColumn {
+            name: $name,
+            meaning: $meaning,
+            values: |trace| Values::$kind(&trace.$field),
+        }),+];
+    };
+}
+sample_columns! {
+    "time_s" "time of the sample" Real time;
+    "target_position_rad" "target position, from the encoder's zero" Real target_position;
+    "target_velocity_rad_s" "target velocity" Real target_velocity;
+    "target_acceleration_rad_s2" "target acceleration" Real target_acceleration;
+    "position_rad" "true position" Real position;
+    "velocity_rad_s" "true velocity; exactly 0 when stuck" Real velocity;
+    "error_rad" "true error, target less position" Real error;
+    "counts" "the encoder's counts" Counts counts;
+    "measured_error_rad" "error as the law saw it" Real measured_error;
+    "error_rate_rad_s" "rate of the error as the law saw it" Real error_rate;
+    "code" "code given to the converter" Codes code;
+    "voltage_v" "voltage commanded at this sample, before delay and lag" Real voltage;
+    "demand_v" "the law's answer, before the converter" Real demand;
+    "limit" "limit of the output that decided it: 0 none, 1 the lowest, 2 the highest, 3 the demand was no number" Limits limit;
+    "stuck" "the shaft is stuck at the sample" Flags stuck;
+}
 
 impl Trace {
     /// The law's terms as columns of a table of samples; a name that a sample has already gets `law_` before it.
     pub fn term_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
         self.terms.iter().map(|(name, values)| {
-            let taken = SAMPLE_COLUMNS.iter().any(|(column, _)| column == name);
+            let taken = SAMPLE_COLUMNS.iter().any(|column| column.name == *name);
             (if taken { format!("law_{name}") } else { (*name).to_owned() }, values.as_slice())
         })
     }

@@ -41,7 +41,7 @@ pub struct NoInstructions {
     known: Vec<&'static str>,
 }
 
-/// What all rows have in common.
+/// Everything that all rows have in common.
 #[derive(Clone, Debug)]
 struct Shared {
     /// A scenario of which every row is a variation.

@@ -36,7 +36,7 @@ fn in_value(path: &str, key: &str, value: &Value) -> Option<(String, &'static st
         Value::Array(list) => {
             let tables = list.iter().enumerate().filter(|(_, value)| value.is_table());
             let mut tables =
-                tables.filter_map(|(i, value)| Some((format!("{path}[{i}]"), value.as_table()?)));
+                tables.filter_map(|(i, value)| Some((format!("{path}[{}]", i + 1), value.as_table()?)));
             tables.find_map(|(path, table)| {
                 let mut keys = table.iter().filter(|(key, _)| *key != "friction");
                 keys.find_map(|(key, value)| in_value(&format!("{path}.{key}"), key, value))

@@ -452,6 +452,20 @@ fn a_table_in_two_places_is_named_by_its_own() {
     Scenario::parse("two", &place.base.to_string(), &set).unwrap();
 }
 
+/// Law and velocity each have a filter; a constructor's error has the table alone, and the value tells which.
+#[test]
+fn of_two_filters_the_one_that_is_wrong_is_named() {
+    let base = places().into_iter().find(|place| place.key == "law.glide.filter.ripple_share").unwrap().base;
+    let velocity = "velocity.edge_timed.ripple_waves_per_turn";
+    let law = "law.glide.filter.ripple_waves_per_turn";
+    for (wrong, good) in [(law, velocity), (velocity, law)] {
+        let set =
+            [(good, "340.0"), (wrong, "20000.0")].map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let error = Scenario::parse("two", &base.to_string(), &set).unwrap_err();
+        assert_eq!((error.key.as_str(), error.value.as_str()), (wrong, "20000"), "{error}");
+    }
+}
+
 /// A relation of keys names another one; these relate the value to no other.
 const BY_ITSELF: &[&str] = &[
     "at least one point",

@@ -21,9 +21,10 @@ use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::{Table, Value};
 use clutch_tune::{Options, Tuned, Verdict, tune};
-use course::{Kept, degrees, drive, known, largest_ripple, median, on_hidden, rigs_and_seed};
-use random_rig::Outcome;
-use random_rig::motor::{Truth, truth};
+use course::{Kept, degrees, drive, known, largest_ripple, median, on_hidden};
+use random_rig::asked::Asked;
+use random_rig::motor::{Truth, truth_with};
+use random_rig::{Outcome, Set};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -52,8 +53,8 @@ struct Course {
     /// The loop with the gains from a text book that the axis came with.
     untuned: Run,
     tuning_s: f64,
-    /// Where nothing was given out, the standing of each law.
-    standing: Vec<String>,
+    /// Where nothing was given out, the outcome of each law.
+    outcome: Vec<String>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -120,8 +121,8 @@ fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<String>> {
     Ok(held.into_iter().filter(|(_, holds)| !holds).map(|(name, _)| name.to_owned()).collect())
 }
 
-fn course(seed: u64) -> Outcome<Vec<Course>> {
-    let truth = truth(seed)?;
+fn course(seed: u64, set: &Set) -> Outcome<Vec<Course>> {
+    let truth = truth_with(seed, set)?;
     let mut runner = PartRunner::default();
     let run = &mut |name: &str, part: &Scenario| runner.run(name, part);
     let report = identify(&experiment(&truth.scenario, &Programme::default(), run)?);
@@ -149,8 +150,8 @@ fn course(seed: u64) -> Outcome<Vec<Course>> {
             let untuned = in_the_loop(&along(&truth.scenario, path, *times)?)?;
             let law = winner.map(|w| w.name.clone());
             let of = found.candidates.iter().filter(|_| winner.is_none());
-            let standing = of.map(|c| format!("{}: {:?}", c.name, c.standing)).collect();
-            Ok(Course { law, bound, outside, tuned, untuned, tuning_s, standing })
+            let outcome = of.map(|c| format!("{}: {:?}", c.name, c.outcome)).collect();
+            Ok(Course { law, bound, outside, tuned, untuned, tuning_s, outcome })
         })
         .collect()
 }
@@ -197,11 +198,13 @@ fn certified(name: &str, done: &[Vec<Course>], path: usize) -> String {
 }
 
 fn main() -> Outcome<()> {
-    let (axes, first) = rigs_and_seed()?;
-    let mut kept = Kept::open()?;
+    let asked = Asked::of_the_line([20, 30_001], &[])?;
+    let (axes, first) = (asked.rigs, asked.first);
+    let mut kept = Kept::open(&asked.other())?;
     let mut done: Vec<Vec<Course>> = Vec::new();
     for seed in first..first + axes {
-        match kept.course(seed, course) {
+        let set = asked.set_of(seed);
+        match kept.course(seed, |seed| course(seed, &set)) {
             Ok(course) => {
                 for (c, (name, ..)) in course.iter().zip(PATHS) {
                     println!("axis {seed}, {name}: {c:?}");

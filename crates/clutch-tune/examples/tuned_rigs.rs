@@ -19,8 +19,9 @@ use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::Table;
 use clutch_tune::{Options, Tuned, Verdict, tune};
-use course::{Driven, Kept, degrees, drive, known, largest_ripple, median, on_hidden, rigs_and_seed};
-use random_rig::{Outcome, Truth, truth};
+use course::{Driven, Kept, degrees, drive, known, largest_ripple, median, on_hidden};
+use random_rig::asked::Asked;
+use random_rig::{Outcome, Set, Truth, named, truth_with};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -69,8 +70,8 @@ fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<&'static str>> {
     Ok(names)
 }
 
-fn course(seed: u64) -> Outcome<Course> {
-    let truth = truth(seed)?;
+fn course(seed: u64, set: &Set) -> Outcome<Course> {
+    let truth = truth_with(seed, set)?;
     let mut runner = PartRunner::default();
     let recordings =
         experiment(&truth.scenario, &Programme::default(), &mut |name, part| runner.run(name, part))?;
@@ -85,7 +86,7 @@ fn course(seed: u64) -> Outcome<Course> {
     let run = winner.map(|w| drive(&on_hidden(&w, &truth.scenario, [LOOP_S, SETTLE_S])?)).transpose()?;
     let smooth = |d: &Driven| d.metrics.stick_time_fraction == 0.0 && d.ended.is_none();
     Ok(Course {
-        delay_ticks: (truth.delay * 1e3).round() as u32,
+        delay_ticks: truth.scenario.params().rig.delay_ticks,
         bound_rad: match tuned.winner().map(|w| &w.verdict) {
             Some(Verdict::Certified { error_rad, .. }) => Some(*error_rad),
             _ => None,
@@ -101,7 +102,8 @@ fn course(seed: u64) -> Outcome<Course> {
 /// A rig's course in words: what was given out and what it did; where nothing certified was, what limits.
 fn told(truth: &Truth, tuned: &Tuned, run: Option<&Driven>, tuning_s: f64) -> String {
     let mut text = format!(
-        "delay {:.0} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %: ",
+        "{}, delay {:.1} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %: ",
+        named(&truth.scenario),
         1e3 * truth.delay,
         truth.hold,
         truth.ratio,
@@ -130,7 +132,7 @@ fn told(truth: &Truth, tuned: &Tuned, run: Option<&Driven>, tuning_s: f64) -> St
     }
     if tuned.winner().is_none() {
         for c in &tuned.candidates {
-            text += &format!("\n    {}: {:?}", c.name, c.standing);
+            text += &format!("\n    {}: {:?}", c.name, c.outcome);
         }
     }
     text
@@ -151,12 +153,14 @@ fn row(name: &str, of: &[&Course]) -> String {
 }
 
 fn main() -> Outcome<()> {
-    let (rigs, first) = rigs_and_seed()?;
-    let mut kept = Kept::open()?;
+    let asked = Asked::of_the_line([50, 30_001], &["short"])?;
+    let (rigs, first) = (asked.rigs, asked.first);
+    let mut kept = Kept::open(&asked.other())?;
     let mut done: Vec<Course> = Vec::new();
     // One after another: each takes all cores, and its time is its own.
     for seed in first..first + rigs {
-        match kept.course(seed, course) {
+        let set = asked.set_of(seed);
+        match kept.course(seed, |seed| course(seed, &set)) {
             Ok(course) => {
                 println!("rig {seed}: {}", course.told);
                 done.push(course);
@@ -169,6 +173,10 @@ fn main() -> Outcome<()> {
          bound: median, largest | error seen: median, largest | bounds broken |"
     );
     println!("|---|---|---|---|---|---|---|---|");
+    if asked.has("short") {
+        println!("{}", row(&asked.other(), &done.iter().collect::<Vec<_>>()));
+        return Ok(());
+    }
     for ticks in 0..=2_u32 {
         let of: Vec<&Course> = done.iter().filter(|c| c.delay_ticks == ticks).collect();
         println!("{}", row(&format!("delay of {ticks} periods"), &of));

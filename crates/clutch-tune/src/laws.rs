@@ -1,10 +1,12 @@
 //! Laws that are tried, and the gains of each candidate.
 
-use clutch_core::edge_timed::{EdgeTimedParams, waves_for};
+use crate::proof::typed;
+use clutch_core::edge_timed::{EdgeTimedParams, waves_seen};
 use clutch_core::friction::FrictionModel as _;
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 use clutch_core::{ActuatorKind, Plant};
+use clutch_sim::ripple::RippleParams;
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::{Scenario, ScenarioError};
 
@@ -40,7 +42,7 @@ enum Told {
     Inertia,
     /// Rate below which micro-steps are taken, °/s.
     Steps,
-    /// Waves of the ripple that the encoder sees, where it does not see the default's.
+    /// Waves of the ripple at the middle of its band, or the most that the encoder sees, where they are not near the default's.
     Waves,
 }
 
@@ -212,6 +214,9 @@ pub(crate) type Gains = Vec<(String, f64)>;
 /// Rate below which a shaft does not slide under an encoder of 20 000 counts, °/s: docs/smooth.md.
 const STEPS_BELOW: f64 = 0.95;
 
+/// Waves over those of glide's default that it does as well with untold.
+const NEAR: core::ops::RangeInclusive<f64> = 0.5..=2.0;
+
 impl Told {
     /// A feed-forward of the believed shaft, as the law PID documents it; none that it has no key for.
     fn volts(self, plant: &Plant<f64>) -> Option<f64> {
@@ -235,8 +240,11 @@ impl Told {
             Told::Ripple => Value::Float(rig.ripple.as_ref().map_or(0.03, |ripple| ripple.rms.max(0.03))),
             Told::Lag => Value::Float(rig.actuator_time_constant?),
             Told::Waves => {
-                let waves = waves_for(rig.encoder.sensor.counts_per_rev);
-                (waves < EdgeTimedParams::<f64>::default().waves).then_some(Value::Float(waves))?
+                let unseen = EdgeTimedParams::<f64>::default().waves;
+                let middle = |r: &RippleParams| 0.5 * (f64::from(r.lowest) + f64::from(r.highest));
+                let waves = rig.ripple.as_ref().map(middle).filter(|waves| !NEAR.contains(&(waves / unseen)));
+                let waves = waves_seen(waves.unwrap_or(unseen), rig.encoder.sensor.counts_per_rev);
+                (waves != unseen).then_some(Value::Float(waves))?
             }
             Told::Delay => Value::Integer(rig.delay_ticks.min(3).into()),
             Told::Steps => {
@@ -269,8 +277,7 @@ impl Family {
         let drawn = |(gain, base): (&Gain, &u32)| {
             let value =
                 volts.in_unit(gain.unit) * gain.low * (gain.high / gain.low).powf(van_der_corput(n, *base));
-            // Four digits: what is typed again is what was run.
-            (gain.key.to_owned(), format!("{value:.3e}").parse().unwrap_or(value))
+            (gain.key.to_owned(), typed(value))
         };
         self.gains.iter().zip(&BASES).map(drawn).collect()
     }

@@ -18,9 +18,10 @@ use clutch_sim::scenario::{Table, Value};
 use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Scenario, ScenarioError};
 use laws::{FAMILIES, Family, Gains, SMOOTHING, Volts, family_of};
-use proof::{Bounds, SHELLS, prove};
+use proof::{Bounds, prove};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::VecDeque;
 use trial::{Trial, scores};
 
 /// The request.
@@ -53,6 +54,10 @@ const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
 const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
 const JUDGING: std::ops::RangeInclusive<u64> = 101..=108;
 const ACCEPTING: std::ops::RangeInclusive<u64> = 201..=210;
+/// Gains of a law that are looked at behind its best, each on judging and accepting discs of its own, where sticks refused the ones
+/// before and were rare: in one of so many runs at most. Chance decides there.
+const NEXT_GAINS: usize = 2;
+const RARE: u32 = 8;
 /// Least time behind the settling time along a path that is no ramp, s.
 const LEAST_S: f64 = 1.0;
 /// Lengths of their runs on a ramp, s; along another path they are as long as the scenario's.
@@ -60,10 +65,10 @@ const SHORT_S: f64 = 2.0;
 const LONG_S: f64 = 4.0;
 const ACCEPT_S: f64 = 6.0;
 
-/// The standing of a candidate.
+/// The outcome of a candidate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "is")]
-pub enum Standing {
+pub enum Outcome {
     /// Its gains are given out.
     Chosen,
     /// Smoother ones are.
@@ -121,12 +126,31 @@ pub struct Candidate {
     /// The proof.
     pub verdict: Verdict,
     /// Chosen, or why not.
-    pub standing: Standing,
+    pub outcome: Outcome,
     /// Candidates of this law that were tried, and those that were left out as unstable before.
     pub tried: (u32, u32),
+    /// Number of this law's gains that were smoother where gains are chosen, and that a rare stick refused.
+    pub before: u32,
     /// The whole scenario.
     #[serde(skip)]
     pub scenario: Option<Scenario>,
+}
+
+impl Candidate {
+    /// For sorting: a law without stable gains comes last.
+    fn rank(&self) -> f64 {
+        if self.scenario.is_none() { f64::INFINITY } else { self.score.order() }
+    }
+
+    /// Its score on discs that no gain was chosen on.
+    fn judged(&mut self, score: Score) {
+        let simulated_s = self.score.simulated_s + score.simulated_s;
+        self.score = Score { simulated_s, ..score };
+        self.outcome = match score.cost {
+            Some(_) => Outcome::Uncertified { why: String::new() },
+            None => Outcome::Strays,
+        };
+    }
 }
 
 /// The outcome.
@@ -251,12 +275,10 @@ fn rates(scenario: &Scenario, options: &Options) -> Result<Vec<f64>, ScenarioErr
 
 /// A candidate on its way.
 struct Finalist {
+    row: Candidate,
     family: &'static Family,
-    gains: Gains,
-    scenario: Option<Scenario>,
-    in_shell: bool,
-    score: Score,
-    tried: (u32, u32),
+    /// The law's next gains, the best of them first.
+    next: VecDeque<(Scenario, Gains)>,
 }
 
 /// The shell that was proven, and those before it that were not.
@@ -319,16 +341,19 @@ impl Job<'_> {
         let tried = all.len() as u32;
         let stable: Vec<(Scenario, Gains)> = all.into_iter().filter(|(s, _)| is_stable(s)).collect();
         let unstable = tried - stable.len() as u32;
-        let nothing = Finalist {
-            family,
+        let row = Candidate {
+            name: family.name.to_owned(),
             gains: Gains::new(),
-            scenario: None,
-            in_shell: false,
             score: Score::default(),
+            verdict: Verdict::NotLookedFor,
+            outcome: Outcome::Unstable,
             tried: (tried, unstable),
+            before: 0,
+            scenario: None,
         };
+        let mut finalist = Finalist { row, family, next: VecDeque::new() };
         if stable.is_empty() {
-            return Ok(nothing);
+            return Ok(finalist);
         }
         let first = self.scores(&refs(&stable), &[Corner::BELIEVED], FIRST, SHORT_S)?;
         let mut kept: Vec<(f64, (Scenario, Gains))> = first.iter().map(Score::order).zip(stable).collect();
@@ -337,11 +362,14 @@ impl Job<'_> {
         let kept: Vec<(Scenario, Gains)> = kept.into_iter().map(|(_, candidate)| candidate).collect();
         let second = self.scores(&refs(&kept), &self.corners, CHOOSING, LONG_S)?;
         let simulated = first.iter().chain(&second).map(|s| s.simulated_s).sum::<f64>();
-        let best =
-            (0..kept.len()).min_by(|a, b| second[*a].order().total_cmp(&second[*b].order())).unwrap_or(0);
-        let Some((scenario, gains)) = kept.into_iter().nth(best) else { return Ok(nothing) };
-        let score = Score { simulated_s: simulated, ..Score::default() };
-        Ok(Finalist { gains, scenario: Some(scenario), score, ..nothing })
+        let mut ordered: Vec<(f64, (Scenario, Gains))> = second.iter().map(Score::order).zip(kept).collect();
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+        finalist.next = ordered.into_iter().map(|(_, candidate)| candidate).take(1 + NEXT_GAINS).collect();
+        if let Some((scenario, gains)) = finalist.next.pop_front() {
+            (finalist.row.scenario, finalist.row.gains) = (Some(scenario), gains);
+        }
+        finalist.row.score.simulated_s = simulated;
+        Ok(finalist)
     }
 
     /// The first shell that is proven.
@@ -356,8 +384,9 @@ impl Job<'_> {
                 None => prove(&within, &self.rates_deg_s),
             }
         };
-        let tried = SHELLS.par_iter().map(one).collect::<Result<Vec<_>, ScenarioError>>()?;
-        for (shell, found) in SHELLS.iter().zip(tried) {
+        let all = proof::shells(&self.base);
+        let tried = all.par_iter().map(one).collect::<Result<Vec<_>, ScenarioError>>()?;
+        for (shell, found) in all.iter().zip(tried) {
             match found {
                 Err(why) => shells.open.push((*shell, why)),
                 Ok(bounds) => {
@@ -374,10 +403,15 @@ impl Job<'_> {
         let Some((shell, _)) = &shells.proven else { return Ok(()) };
         let mut more = Vec::new();
         for f in all.iter().filter(|f| !f.family.certified_alone()) {
-            let Some(scenario) = &f.scenario else { continue };
-            let scenario = Some(within(scenario, shell)?);
-            let (gains, score) = (f.gains.clone(), Score::default());
-            more.push(Finalist { family: f.family, gains, scenario, in_shell: true, score, tried: f.tried });
+            let Some(scenario) = &f.row.scenario else { continue };
+            let next = f.next.iter().map(|(scenario, gains)| Ok((within(scenario, shell)?, gains.clone())));
+            let row = Candidate {
+                name: format!("{} in a shell", f.row.name),
+                score: Score::default(),
+                scenario: Some(within(scenario, shell)?),
+                ..f.row.clone()
+            };
+            more.push(Finalist { row, next: next.collect::<Result<_, ScenarioError>>()?, ..*f });
         }
         all.extend(more);
         Ok(())
@@ -385,13 +419,13 @@ impl Job<'_> {
 
     /// Scores on discs that no gain was chosen on.
     fn judge(&self, all: &mut [Finalist]) -> Result<(), ScenarioError> {
-        let scenarios: Vec<&Scenario> = all.iter().filter_map(|f| f.scenario.as_ref()).collect();
+        let scenarios: Vec<&Scenario> = all.iter().filter_map(|f| f.row.scenario.as_ref()).collect();
         let judged = self.scores(&scenarios, &self.corners, JUDGING, LONG_S)?;
-        let some = all.iter_mut().filter(|f| f.scenario.is_some());
+        let some = all.iter_mut().filter(|f| f.row.scenario.is_some());
         for (f, score) in some.zip(judged) {
-            f.score = Score { simulated_s: f.score.simulated_s + score.simulated_s, ..score };
+            f.row.judged(score);
         }
-        all.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        all.sort_by(|a, b| a.row.rank().total_cmp(&b.row.rank()));
         Ok(())
     }
 
@@ -409,80 +443,123 @@ impl Job<'_> {
     }
 
     /// The first that has a certificate and starts from rest; without one if that is asked for.
-    fn choose(&self, all: Vec<Finalist>, shells: Shells) -> Result<Tuned, ScenarioError> {
-        let mut tuned = Tuned {
+    fn choose(&self, mut all: Vec<Finalist>, shells: Shells) -> Result<Tuned, ScenarioError> {
+        let mut chosen = self.first_of(&mut all, &shells, false)?;
+        if chosen.is_none() && self.options.uncertified {
+            chosen = self.first_of(&mut all, &shells, true)?;
+        }
+        let mut candidates: Vec<Candidate> = all.into_iter().map(|f| f.row).collect();
+        candidates.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        let winner = candidates.iter().position(|c| c.outcome == Outcome::Chosen);
+        if let Some(than) = winner.and_then(|n| candidates[n].score.cost) {
+            for other in &mut candidates {
+                if matches!(&other.outcome, Outcome::Uncertified { why } if why.is_empty()) {
+                    other.outcome = Outcome::Rougher { than };
+                }
+            }
+        }
+        let simulated_s = candidates.iter().map(|c| c.score.simulated_s).sum();
+        let (from_rest, certificate) = chosen.map_or((None, None), |(score, proof)| (Some(score), proof));
+        Ok(Tuned {
             rates_deg_s: self.rates_deg_s.clone(),
             corners: self.corners.clone(),
-            simulated_s: all.iter().map(|f| f.score.simulated_s).sum(),
-            candidates: all.into_iter().map(Finalist::told).collect(),
-            chosen: None,
-            from_rest: None,
+            candidates,
+            chosen: winner,
+            from_rest,
             output_v: self.output_v,
             uncovered: self.uncovered.clone(),
-            open_shells: shells.open.clone(),
-            certificate: None,
+            open_shells: shells.open,
+            simulated_s,
+            certificate,
             believed: self.base.clone(),
-        };
-        for n in 0..tuned.candidates.len() {
-            let candidate = &mut tuned.candidates[n];
-            let Some(scenario) = candidate.scenario.clone().filter(|_| candidate.score.cost.is_some()) else {
-                continue;
-            };
-            let Score { runs_with_sticks, runs, .. } = candidate.score;
-            if runs_with_sticks > 0 && self.on_a_ramp() {
+        })
+    }
+
+    /// The first row, in the order of cost, that starts from rest, with its score there and its proof; a law's next gains come
+    /// into the order where a stick that is rare refuses the ones before.
+    fn first_of(
+        &self,
+        all: &mut Vec<Finalist>,
+        shells: &Shells,
+        uncertified: bool,
+    ) -> Result<Option<(Score, Option<Certificate>)>, ScenarioError> {
+        let mut n = 0;
+        while let Some(Finalist { row, .. }) = all.get_mut(n) {
+            n += 1;
+            let open = matches!(row.outcome, Outcome::Uncertified { .. });
+            let Some(scenario) = row.scenario.clone().filter(|_| open) else { continue };
+            let mut sticks = row.score;
+            let mut certificate = None;
+            if sticks.runs_with_sticks > 0 && self.on_a_ramp() {
                 // It would be refused from rest, too, behind a proof that takes its time.
+                let Score { runs_with_sticks, runs, .. } = sticks;
                 let why = format!(
                     "it sticks in {runs_with_sticks} of {runs} runs on discs that it was not chosen on"
                 );
-                candidate.standing = Standing::Refused { why };
-                continue;
-            }
-            match self.proven(&scenario, &shells)? {
-                Err(why) => {
-                    candidate.verdict = Verdict::Uncertified { why: why.clone() };
-                    candidate.standing = Standing::Uncertified { why };
-                }
-                Ok(Bounds { lines, error_rad, certificate }) => {
-                    let shell = scenario.params().shell.boundary > 0.0;
-                    candidate.verdict = Verdict::Certified { error_rad, shell, lines };
-                    if self.accept(n, &scenario, &mut tuned)? {
-                        tuned.certificate = Some(certificate);
-                        break;
+                row.outcome = Outcome::Refused { why };
+            } else {
+                if row.verdict == Verdict::NotLookedFor {
+                    match self.proven(&scenario, shells)? {
+                        Err(why) => {
+                            row.verdict = Verdict::Uncertified { why: why.clone() };
+                            row.outcome = Outcome::Uncertified { why };
+                        }
+                        Ok(Bounds { lines, error_rad, certificate: proof }) => {
+                            let shell = scenario.params().shell.boundary > 0.0;
+                            row.verdict = Verdict::Certified { error_rad, shell, lines };
+                            certificate = Some(proof);
+                        }
                     }
                 }
-            }
-        }
-        if tuned.chosen.is_none() && self.options.uncertified {
-            for n in 0..tuned.candidates.len() {
-                let open = matches!(tuned.candidates[n].standing, Standing::Uncertified { .. });
-                let Some(scenario) = tuned.candidates[n].scenario.clone().filter(|_| open) else { continue };
-                if self.accept(n, &scenario, &mut tuned)? {
-                    break;
+                if !uncertified && certificate.is_none() {
+                    continue;
+                }
+                sticks = self.accept(row, &scenario)?;
+                if row.outcome == Outcome::Chosen {
+                    return Ok(Some((sticks, certificate)));
                 }
             }
-        }
-        if let Some(cost) = tuned.winner().and_then(|w| w.score.cost) {
-            for other in &mut tuned.candidates {
-                if matches!(&other.standing, Standing::Uncertified { why } if why.is_empty()) {
-                    other.standing = Standing::Rougher { than: cost };
-                }
+            if let Some(next) = self.next_gains(&mut all[n - 1], &sticks)? {
+                let behind = all[n..].partition_point(|other| other.row.rank() <= next.row.rank());
+                all.insert(n + behind, next);
             }
         }
-        Ok(tuned)
+        Ok(None)
+    }
+
+    /// The next gains of a law, judged, where the ones before stick rarely.
+    fn next_gains(&self, refused: &mut Finalist, sticks: &Score) -> Result<Option<Finalist>, ScenarioError> {
+        let Score { runs_with_sticks, runs, .. } = *sticks;
+        let rare = sticks.cost.is_some() && self.on_a_ramp() && (1..=runs / RARE).contains(&runs_with_sticks);
+        let Some((scenario, gains)) = refused.next.pop_front().filter(|_| rare) else { return Ok(None) };
+        let before = refused.row.before + 1;
+        let score = self.scores(&[&scenario], &self.corners, others(JUDGING, before), LONG_S)?.pop();
+        let name = &refused.row.name;
+        let best = name.strip_suffix(&format!(" ({before})")).unwrap_or(name);
+        let mut row = Candidate {
+            name: format!("{best} ({})", before + 1),
+            gains,
+            score: Score::default(),
+            verdict: Verdict::NotLookedFor,
+            before,
+            scenario: Some(scenario),
+            ..refused.row.clone()
+        };
+        row.judged(score.unwrap_or_default());
+        Ok(Some(Finalist { row, family: refused.family, next: std::mem::take(&mut refused.next) }))
     }
 
     /// Lets a candidate start from rest at the lowest rate, or along the path, on discs of its own: on a ramp it has to slide
-    /// once it has settled, and everywhere to stay within what is proven of it.
-    fn accept(&self, n: usize, scenario: &Scenario, tuned: &mut Tuned) -> Result<bool, ScenarioError> {
+    /// once it has settled, and everywhere to stay within what is proven of it. Its score there.
+    fn accept(&self, candidate: &mut Candidate, scenario: &Scenario) -> Result<Score, ScenarioError> {
         let trial = Trial {
             rates_deg_s: self.rates_deg_s.get(..1).unwrap_or_default(),
             corners: &self.corners,
-            discs: ACCEPTING,
+            discs: others(ACCEPTING, candidate.before),
             seconds: ACCEPT_S,
         };
         let score = scores(&[scenario], &trial, self.report)?.pop().unwrap_or_default();
-        tuned.simulated_s += score.simulated_s;
-        let candidate = &mut tuned.candidates[n];
+        candidate.score.simulated_s += score.simulated_s;
         let within = match candidate.verdict {
             Verdict::Certified { error_rad, .. } => score.max_error_rad <= error_rad,
             _ => true,
@@ -494,42 +571,19 @@ impl Job<'_> {
         } else if !within {
             "its error exceeds what is proven: please report this as a defect".to_owned()
         } else {
-            candidate.standing = Standing::Chosen;
-            (tuned.chosen, tuned.from_rest) = (Some(n), Some(score));
-            return Ok(true);
+            candidate.outcome = Outcome::Chosen;
+            return Ok(score);
         };
-        candidate.standing = Standing::Refused { why };
-        Ok(false)
+        candidate.outcome = Outcome::Refused { why };
+        Ok(score)
     }
 }
 
-impl Finalist {
-    /// For sorting: a law without stable gains comes last.
-    fn rank(&self) -> f64 {
-        if self.scenario.is_none() { f64::INFINITY } else { self.score.order() }
-    }
-
-    fn told(self) -> Candidate {
-        let name = if self.in_shell {
-            format!("{} in a shell", self.family.name)
-        } else {
-            self.family.name.to_owned()
-        };
-        let standing = match (&self.scenario, self.score.cost) {
-            (None, _) => Standing::Unstable,
-            (_, None) => Standing::Strays,
-            _ => Standing::Uncertified { why: String::new() },
-        };
-        Candidate {
-            name,
-            gains: self.gains,
-            score: self.score,
-            verdict: Verdict::NotLookedFor,
-            standing,
-            tried: self.tried,
-            scenario: self.scenario,
-        }
-    }
+/// As many discs behind those, on which the gains that were judged before did not run.
+fn others(discs: std::ops::RangeInclusive<u64>, before: u32) -> std::ops::RangeInclusive<u64> {
+    let (first, last) = discs.into_inner();
+    let on = u64::from(before) * (last - first + 1);
+    first + on..=last + on
 }
 
 fn refs(of: &[(Scenario, Gains)]) -> Vec<&Scenario> {
@@ -557,7 +611,7 @@ fn output_keys([lowest, highest]: [f64; 2]) -> [(&'static str, f64); 2] {
 fn forwards(base: &Scenario) -> Result<(Scenario, Option<[f64; 2]>), ScenarioError> {
     let as_it_is = || Ok((base.clone(), None));
     let Some(inner) = any_inner(base)? else { return as_it_is() };
-    let inner = within(&inner, &SHELLS[0])?;
+    let inner = within(&inner, &proof::shells(base)[0])?;
     let Some(turns) = inner.lowest_forwards(&inner.plan()?.bounds).filter(|volts| *volts < 0.0) else {
         return as_it_is();
     };
@@ -578,7 +632,7 @@ fn forwards(base: &Scenario) -> Result<(Scenario, Option<[f64; 2]>), ScenarioErr
 /// for, no law is.
 fn uncovered(base: &Scenario) -> Result<Option<String>, ScenarioError> {
     let Some(inner) = any_inner(base)? else { return Ok(None) };
-    let within = within(&inner, &SHELLS[0])?;
+    let within = within(&inner, &proof::shells(base)[0])?;
     Ok(within.sampled_setup(&within.plan()?.bounds).err().map(|why| why.to_string()))
 }
 

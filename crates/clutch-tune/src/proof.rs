@@ -17,12 +17,30 @@ pub struct ShellTried {
     pub smoothing: f64,
 }
 
-/// Shells that are tried, the tightest first. Each lets an edge of an encoder of 20 000 counts pass, which with the smoothing
-/// `κ` counts as `κ q/T_s` = 0.06 rad/s.
-pub(crate) const SHELLS: [ShellTried; 2] = [
-    ShellTried { slope_1_s: 50.0, boundary_rad_s: 0.2, smoothing: 0.2 },
-    ShellTried { slope_1_s: 70.0, boundary_rad_s: 0.3, smoothing: 0.2 },
-];
+/// `f`, 1/s, and `S`, rad/s, of shells that let an edge of an encoder of 20 000 counts pass, the tightest first: it counts as
+/// `κ q/T_s` = 0.06 rad/s.
+const SHELLS: [[f64; 2]; 2] = [[50.0, 0.2], [70.0, 0.3]];
+const COUNTS: f64 = 20_000.0;
+/// Time constant `T_s/κ` of the rate that they know, s.
+const FILTER_S: f64 = 0.005;
+
+/// Shells that are tried, the tightest first. Their filter's time is the same at each period. One of a coarser encoder has to be
+/// wider, and slower as well: within it the shaft goes on for `1/f`.
+pub(crate) fn shells(base: &Scenario) -> [ShellTried; 2] {
+    let spec = base.spec();
+    let coarser = (COUNTS / f64::from(spec.rig.encoder.sensor.counts_per_rev)).max(1.0).sqrt();
+    let smoothing = (spec.period.seconds::<f64>() / FILTER_S).min(1.0);
+    SHELLS.map(|[slope, boundary]| ShellTried {
+        slope_1_s: typed(slope / coarser),
+        boundary_rad_s: typed(boundary * coarser),
+        smoothing: typed(smoothing),
+    })
+}
+
+/// Four digits: what is typed again is what was run.
+pub(crate) fn typed(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
 
 /// Effort of a search: comparisons per attempt, some seconds.
 const WORK: u64 = 2_500_000_000;

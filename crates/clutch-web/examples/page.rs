@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 /// Laws on common axes: name among the keys, name for people, scenario.
 const LAWS: [(&str, &str, &str); 4] = [
     ("pd", "PD", "bench_pd_2"),
-    ("pid", "PID", "pid_2"),
+    ("pid", "PID", "bench_pid_2"),
     ("smc", "SMC", "bench_smc_2"),
     ("glide", "Glide", "bench_glide_2"),
 ];

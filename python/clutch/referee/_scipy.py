@@ -403,7 +403,7 @@ def _passed_over(done: Any, watch: list[Callable[[float, _Vector], float]]) -> t
                     at = float(brentq(value, grid[i - 1], low, xtol=1e-15))
                     first = (at, which) if first is None or at < first[0] else first
                     break
-    # What the solver found at its end is no other.
+    # The end that the solver found is no other.
     return first if first is not None and first[0] < done.t[-1] - 1e-12 else None
 
 

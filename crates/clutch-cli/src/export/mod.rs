@@ -5,7 +5,7 @@ mod columns;
 mod lines;
 mod table;
 
-use crate::output::{Exit, new_file, tell, warn, wrote};
+use crate::output::{Exit, new_file, tell, to_write, warn, wrote};
 use crate::signals::stop_flag;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
@@ -22,7 +22,7 @@ pub(crate) struct Export {
     #[arg(value_name = "LOG.mcap")]
     log: PathBuf,
     /// The new file, by its ending: .csv, or .parquet where the command is built with it.
-    #[arg(long, value_name = "TABLE.csv|parquet")]
+    #[arg(long, value_parser = to_write(), value_name = "TABLE.csv|parquet")]
     out: PathBuf,
     /// The channel whose records are the rows.
     #[arg(long, value_name = "NAME", default_value = "command", value_parser = channels())]

@@ -5,7 +5,7 @@ mod columns;
 
 use crate::args::ScenarioArgs;
 use crate::map;
-use crate::output::{Exit, new_file, tell, with_progress};
+use crate::output::{Exit, new_file, tell, to_write, with_progress};
 use crate::signals::stop_flag;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -39,8 +39,8 @@ use std::time::Instant;
 pub(crate) struct SweepVerb {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// A key and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a list. May be
-    /// given several times.
+    /// A key and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference (of a key that takes
+    /// whole numbers, rounded to them), or a list. May be given several times.
     #[arg(long, value_name = "KEY=VALUES", value_parser = over, required = true)]
     over: Vec<Over>,
     /// Runs each row with the seeds 1 to N.
@@ -48,7 +48,7 @@ pub(crate) struct SweepVerb {
     seeds: Option<u64>,
     /// The table, by its ending: Parquet where the command is built with it, which is made at the end, of a CSV beside it; else
     /// CSV.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_parser = to_write(), value_name = "FILE")]
     out: PathBuf,
     /// Goes on with a file that an earlier sweep of the same rows has begun.
     #[arg(long)]
@@ -76,6 +76,23 @@ const SEED: &str = "run.seed";
 struct Over {
     key: String,
     values: Values,
+    /// Made from LOW:HIGH:NUMBER.
+    spread: bool,
+}
+
+impl Over {
+    /// A key that takes whole numbers has those of a range, each once.
+    fn whole(mut self, scenario: &Scenario) -> Self {
+        if let (true, Values::Listed(list)) =
+            (self.spread && scenario.takes_whole(&self.key), &mut self.values)
+        {
+            let numbers = list.iter().filter_map(|listed| listed.value.as_float());
+            let mut whole: Vec<i64> = numbers.map(|x| x.round() as i64).collect();
+            whole.dedup();
+            *list = whole.into_iter().map(|n| Listed::from(Value::Integer(n))).collect();
+        }
+        self
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -133,13 +150,14 @@ impl Values {
 
 fn over(text: &str) -> Result<Over, String> {
     let (key, list) = text.split_once('=').ok_or("expected KEY=VALUES, as law.pd.kp_v_rad=500:5000:50")?;
-    let values: Vec<Value> = if list.contains(':') && !list.contains(['{', '[', '"']) {
+    let spread = list.contains(':') && !list.contains(['{', '[', '"']);
+    let values: Vec<Value> = if spread {
         map::values(list)?.0.into_iter().map(Value::Float).collect()
     } else {
         items(list).into_iter().map(|item| value(item.trim())).collect::<Result<_, _>>()?
     };
     let values = Values::Listed(values.into_iter().map(Listed::from).collect());
-    Ok(Over { key: key.trim().to_owned(), values })
+    Ok(Over { key: key.trim().to_owned(), values, spread })
 }
 
 /// The parts of a list between commas that stand in no table, array or text.
@@ -182,8 +200,9 @@ impl Grid {
         seeds: Option<u64>,
     ) -> anyhow::Result<Self> {
         if let Some(n) = seeds {
-            axes.push(Over { key: SEED.to_owned(), values: Values::Seeds(n) });
+            axes.push(Over { key: SEED.to_owned(), values: Values::Seeds(n), spread: false });
         }
+        let axes: Vec<Over> = axes.into_iter().map(|axis| axis.whole(scenario)).collect();
         for (i, axis) in axes.iter().enumerate() {
             let twice = axes[..i].iter().any(|other| other.key == axis.key);
             ensure!(!twice, "{}: named twice; name a key once, with all of its values", axis.key);
@@ -420,9 +439,11 @@ impl SweepVerb {
 
 /// The file that rows are added to as they come: the table itself, or of one that ends with its last row a CSV beside it.
 fn lines_of(out: &Path) -> anyhow::Result<PathBuf> {
-    if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
+    let ends_with = |kind: &str| out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind));
+    if ends_with("csv") {
         return Ok(out.to_owned());
     }
+    ensure!(ends_with("parquet"), "{}: expected a name that ends with .csv or .parquet", out.display());
     ensure!(
         cfg!(feature = "parquet"),
         "{}: this command is built without Parquet, which the released one has; name a file that ends with .csv",
@@ -544,6 +565,22 @@ mod tests {
             let alone = Scenario::load(name, &set).unwrap();
             assert_eq!(sweep.scenario(row as usize).unwrap().canonical(), alone.canonical(), "{set:?}");
         }
+    }
+
+    #[test]
+    fn a_range_of_a_key_that_takes_whole_numbers_is_of_them() {
+        let scenario = Scenario::load(Path::new("smc_2"), &[]).unwrap();
+        let texts = |of: &str| -> Vec<String> {
+            let grid = Grid::new("smc_2".into(), &scenario, vec![over(of).unwrap()], None).unwrap();
+            (0..grid.rows)
+                .flat_map(|row| grid.keys_of(row).map(Cow::into_owned).collect::<Vec<_>>())
+                .collect()
+        };
+        assert_eq!(texts("rig.encoder.counts_per_rev=1000:20000:4"), ["1000", "2714", "7368", "20000"]);
+        assert_eq!(texts("rig.delay_ticks=1:3:9"), ["1", "2", "3"]);
+        // A list is as it is written, and so is a range of another key.
+        assert_eq!(texts("rig.delay_ticks=1,1.5"), ["1", "1.5"]);
+        assert_eq!(texts("law.smc.kp_v=1:2:3"), ["1.0", "1.414", "2.0"]);
     }
 
     #[test]

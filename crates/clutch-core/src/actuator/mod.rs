@@ -13,7 +13,8 @@
 //! A voltage above 0 resists with a brake and with both, and drives forwards with a motor. “A brake can only resist” is
 //! not a rule of its own: it follows from the interval of torque that an actuator can give at a velocity, its authority
 //! ([`Bounds::authority`](crate::Bounds::authority), and its part that drives, [`Bounds::drives`](crate::Bounds::drives)). The
-//! check of a path asks for it; certificate, supervisor and safe state ask for its parts at the corner that is worst for each.
+//! check of a path asks for it. The certificate asks for its two ends per volt, as gains are compared with them; the supervisor's
+//! envelope has it in counts, computed once, as each period needs it anew ([`Bounds::possible`](crate::Bounds::possible) is what it is held to).
 //! A torque becomes volts in one place, [`Actuator::volts_for`]; the laws that the paper prints in volts stay in volts.
 
 mod geometry;
@@ -136,6 +137,18 @@ impl ActuatorKind {
     #[must_use]
     pub const fn two_sided(self) -> bool {
         !matches!(self, ActuatorKind::Brake)
+    }
+
+    /// `true` if a voltage drives the shaft, either way.
+    #[must_use]
+    pub fn drives_at<T: Real>(self, volts: T) -> bool {
+        (volts > T::ZERO && self.drives_above_0()) || (volts < T::ZERO && self.two_sided())
+    }
+
+    /// Most volts of an output against a motion forwards, and most with it; of a brake the second do nothing.
+    #[must_use]
+    pub(crate) fn most_volts<T: Real>(self, lowest: T, highest: T) -> [T; 2] {
+        if self.drives_above_0() { [-lowest, highest] } else { [highest, -lowest] }
     }
 }
 

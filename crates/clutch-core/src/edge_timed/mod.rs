@@ -62,11 +62,10 @@ crate::params! {
 /// Counts that a wave of the ripple has to have, more than these.
 const COUNTS_PER_WAVE: i32 = 20;
 
-/// Waves of the ripple per turn for an encoder of so many counts: the default's, or the shortest that it sees.
+/// So many waves of the ripple per turn, or the most that an encoder of so many counts shows.
 #[must_use]
-pub fn waves_for(counts_per_rev: u32) -> f64 {
-    let shortest = f64::from(counts_per_rev) / f64::from(COUNTS_PER_WAVE);
-    EdgeTimedParams::<f64>::default().waves.min(0.99 * shortest)
+pub fn waves_seen(waves: f64, counts_per_rev: u32) -> f64 {
+    waves.min(0.99 * f64::from(counts_per_rev) / f64::from(COUNTS_PER_WAVE))
 }
 
 /// Standard deviation by which the end of a count is blurred where silence cuts the belief off, counts.

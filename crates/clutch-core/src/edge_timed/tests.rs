@@ -285,9 +285,9 @@ proptest::proptest! {
 #[test]
 fn an_encoder_has_the_waves_that_it_sees_or_those_of_the_default() {
     let default = EdgeTimedParams::<f64>::default().waves;
-    assert_eq!(waves_for(20_000), default);
+    assert_eq!(waves_seen(default, 20_000), default);
     for counts in [50, 500, 800] {
-        let params = EdgeTimedParams { waves: waves_for(counts), ..EdgeTimedParams::default() };
+        let params = EdgeTimedParams { waves: waves_seen(default, counts), ..EdgeTimedParams::default() };
         let encoder = Encoder::new::<f64>(counts).unwrap();
         assert!(
             params.waves < default && EdgeTimed::new(&params, &plant(), encoder, PERIOD).is_ok(),

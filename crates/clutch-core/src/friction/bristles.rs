@@ -30,7 +30,7 @@ pub struct Bend<T> {
 impl<T: Real> Bend<T> {
     /// Bristles that are not bent.
     #[must_use]
-    pub fn none() -> Self {
+    pub const fn none() -> Self {
         Bend { each: [T::ZERO; ELEMENTS], slides: [false; ELEMENTS] }
     }
 

@@ -85,6 +85,14 @@ macro_rules! laws {
                 }
             }
 
+            /// Condition on the law's parameters for such a form, in words; empty without one.
+            #[must_use]
+            pub fn sampled_if(&self) -> &'static str {
+                match self {
+                    $(LawParams::$law(_) => <$law<T> as Listed<T>>::SAMPLED_IF,)+
+                }
+            }
+
             /// The law as a certificate of the sampled loop takes it, if it is of such a form.
             #[must_use]
             pub fn sampled(&self) -> Option<SampledForm<T>> {

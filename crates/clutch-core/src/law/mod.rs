@@ -207,6 +207,8 @@ pub trait Listed<T: Real>: ControlLaw<T> + Sized {
     const TITLE: &'static str;
     /// `true` if it follows a path; `false` for an open-loop law, whose path says nothing.
     const FOLLOWS: bool = true;
+    /// Condition on its parameters for [`Listed::sampled`], in words, behind its name; empty without one.
+    const SAMPLED_IF: &'static str = "";
 
     /// The parameters with which a period takes longest: what a measurement of its time uses.
     #[must_use]

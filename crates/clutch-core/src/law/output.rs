@@ -48,12 +48,7 @@ impl<T: Real> OutputParams<T> {
         } else {
             OutputParams::PUSHES.require(self.lowest, !below)?;
         }
-        let still = match kind {
-            ActuatorKind::Brake => true,
-            ActuatorKind::Motor => self.on_invalid == T::ZERO,
-            ActuatorKind::Both => self.on_invalid >= T::ZERO,
-        };
-        OutputParams::MOVES_NOTHING.require(self.on_invalid, still)?;
+        OutputParams::MOVES_NOTHING.require(self.on_invalid, !kind.drives_at(self.on_invalid))?;
         Ok(())
     }
 

@@ -176,6 +176,7 @@ impl<T: Arithmetic> ControlLaw<T> for Pid<T> {
 impl<T: Real> Listed<T> for Pid<T> {
     type Params = PidParams<T>;
     const TITLE: &'static str = "PID";
+    const SAMPLED_IF: &'static str = "without derivative_time_s";
 
     /// With all that it has.
     fn busiest() -> PidParams<T> {
@@ -327,6 +328,6 @@ mod tests {
         let p = PidParams { tracking_time: 0.0005, ..PidParams::default() };
         let e = Pid::<f64>::new(&p, &OutputParams::default(), PERIOD).unwrap_err();
         assert_eq!(e.field(), "tracking_time");
-        assert_eq!(e.to_string(), "tracking_time = 0.0005: expected a time of at least sampling.period_us, s");
+        assert_eq!(e.to_string(), "tracking_time_s = 0.0005: expected a time of at least sampling.period_us, s");
     }
 }

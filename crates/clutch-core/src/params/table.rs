@@ -66,7 +66,7 @@ impl Relation {
 /// }
 /// let pull = PullParams { speed: 1.5_f32, low: 2.0, high: 1.0 };
 /// let error = pull.check_rows().unwrap_err();
-/// assert_eq!(error.to_string(), "high = 1: expected a voltage above low_v");
+/// assert_eq!(error.to_string(), "high_v = 1: expected a voltage above low_v");
 /// ```
 ///
 /// `struct Name<T>` is for any scalar, `struct Name<f64>` for double precision, `struct Name<>` has no real

@@ -103,7 +103,7 @@ impl Checks {
 
     /// Those that are in both sets.
     #[must_use]
-    pub fn both(a: Checks, b: Checks) -> Checks {
+    pub const fn both(a: Checks, b: Checks) -> Checks {
         Checks(a.0 & b.0)
     }
 

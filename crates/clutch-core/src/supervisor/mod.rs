@@ -90,7 +90,7 @@ impl<T: Real> Supervisor<T> {
     /// The same with fewer checks. For the campaign that shows that each of them is needed, and
     /// for nothing else.
     #[must_use]
-    pub fn with_checks(mut self, checks: Checks) -> Self {
+    pub const fn with_checks(mut self, checks: Checks) -> Self {
         self.checks = checks;
         self
     }

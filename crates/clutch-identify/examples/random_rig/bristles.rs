@@ -8,7 +8,7 @@ use clutch_core::friction::FrictionModel as _;
 use clutch_core::{Counts, DacCode};
 use clutch_identify::Recording;
 use clutch_identify::experiment::ExperimentError;
-use clutch_identify::recording::Tick;
+use clutch_identify::recording::{Recorded, glides_at};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_sim::Scenario;
 use clutch_sim::rig::Rig;
@@ -53,10 +53,14 @@ pub(crate) fn bristled(
         let target = path(tick);
         let out = servo.tick(&mut state, seen(angle), &target);
         if out.tick.error.abs() > ASTRAY {
-            return Err(ExperimentError::Ended { part: name.to_owned(), cause: "astray".into(), remedy: "" });
+            return Err(ExperimentError::Ended {
+                part: name.to_owned(),
+                cause: "astray".into(),
+                remedy: String::new(),
+            });
         }
         let sent = servo.dac().volts(out.code);
-        ticks.push(Tick { counts: counts(angle), volts: sent });
+        ticks.push(Recorded { counts: counts(angle), volts: sent });
         line.push_back(sent);
         let volts = line.pop_front().unwrap_or(sent);
         let dt = period / STEPS as f64;
@@ -83,6 +87,7 @@ pub(crate) fn bristled(
         counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
         step_volts,
         volts_before: holds,
+        glides_at: glides_at(scenario),
         first_tick: 0,
         ticks,
     }])

@@ -6,6 +6,7 @@ use rand_pcg::Pcg64;
 use std::error::Error;
 
 pub(crate) mod added;
+pub(crate) mod asked;
 pub(crate) mod bristles;
 pub(crate) mod motor;
 pub(crate) mod unlike;
@@ -25,8 +26,39 @@ pub(crate) struct Truth {
     pub(crate) damping: f64,
 }
 
+/// Keys of a scenario and their values, in the place of a rig's own.
+pub(crate) type Set = [(String, String)];
+
+/// A ripple of waves unlike those of `bench`, for a seed: one wave of 24 to 900 a turn, or three from it on to twice as many.
+pub(crate) fn other_waves(seed: u64) -> Vec<(String, String)> {
+    let mut rng = Pcg64::seed_from_u64(seed ^ 0x7761_7665);
+    let lowest = (24.0 * (900.0_f64 / 24.0).powf(rng.random_range(0.0..1.0_f64))).round() as u32;
+    let (lowest, spacing, highest) = match (rng.random_bool(0.5), lowest / 2) {
+        (true, half) if 4 * half <= 900 => (2 * half, half, 4 * half),
+        _ => (lowest, lowest, lowest),
+    };
+    waves(lowest, spacing, highest)
+}
+
+/// The keys of a ripple's waves.
+pub(crate) fn waves(lowest: u32, spacing: u32, highest: u32) -> Vec<(String, String)> {
+    let keys = [("lowest", lowest), ("spacing", spacing), ("highest", highest)];
+    keys.map(|(which, n)| (format!("rig.ripple.{which}_waves_per_turn"), n.to_string())).to_vec()
+}
+
+/// Name and waves of a rig.
+pub(crate) fn named(rig: &Scenario) -> String {
+    let waves = rig.spec().rig.ripple.map(|r| format!("{} to {} waves", r.lowest, r.highest));
+    format!("{}, {}", rig.name(), waves.unwrap_or_else(|| "even".to_owned()))
+}
+
 /// The rig of a seed.
 pub(crate) fn truth(seed: u64) -> Outcome<Truth> {
+    truth_with(seed, &[])
+}
+
+/// The same with other values of some keys.
+pub(crate) fn truth_with(seed: u64, set: &Set) -> Outcome<Truth> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x6964_656e);
     let inertia = 0.0017 * rng.random_range(0.7..1.3_f64);
     let mass = 0.2 * rng.random_range(0.8..1.2_f64);
@@ -46,12 +78,12 @@ pub(crate) fn truth(seed: u64) -> Outcome<Truth> {
          [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 9.99\n",
         ratio * dynamic,
     );
-    let scenario = Scenario::parse("rig", &text, &[])?;
+    let scenario = Scenario::parse("rig", &text, set)?;
     let torque = mass * 9.81 * 0.024;
     let gain = clutch_core::Actuator::<f64>::new(&scenario.spec().rig.actuator)?.brake_gain();
     Ok(Truth {
+        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>(),
         scenario,
-        delay: f64::from(delay) * 1e-3,
         pull: torque / inertia,
         hold: torque / (dynamic * gain),
         ripple,

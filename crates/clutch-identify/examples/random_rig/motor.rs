@@ -1,6 +1,6 @@
 //! Random motor axes, of which campaigns know nothing but what they measure.
 
-use super::Outcome;
+use super::{Outcome, Set};
 use clutch_sim::Scenario;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -23,6 +23,11 @@ pub(crate) struct Truth {
 
 /// The axis of a seed.
 pub(crate) fn truth(seed: u64) -> Outcome<Truth> {
+    truth_with(seed, &[])
+}
+
+/// The same with other values of some keys.
+pub(crate) fn truth_with(seed: u64, set: &Set) -> Outcome<Truth> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x6d6f_746f);
     let inertia = 0.0017 * rng.random_range(0.7..1.3_f64);
     let sliding = rng.random_range(0.02..0.045_f64); // N m
@@ -48,10 +53,10 @@ pub(crate) fn truth(seed: u64) -> Outcome<Truth> {
         ratio * sliding / 0.25,
         sliding / 0.25,
     );
-    let scenario = Scenario::parse("axis", &text, &[])?;
+    let scenario = Scenario::parse("axis", &text, set)?;
     Ok(Truth {
+        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>(),
         scenario,
-        delay: f64::from(delay) * 1e-3,
         at_rest: ratio * sliding / GAIN,
         sliding: sliding / GAIN,
         load: load / GAIN,

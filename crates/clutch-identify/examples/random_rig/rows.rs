@@ -43,7 +43,7 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 /// The head of a table.
 pub(crate) fn print_head() {
     println!(
-        "| parameter | told | error, median | p90 | largest | interval holds it | half width of the interval, median |"
+        "| parameter | found | error, median | p90 | largest | interval holds it | half width of the interval, median |"
     );
     println!("|---|---|---|---|---|---|---|");
 }

@@ -32,9 +32,10 @@ impl Default for Programme {
     }
 }
 
-/// Least and most that the limits may be: a ride at 5 °/s needs 8° to be even, and C/K a rate well above that.
-const TRAVELS_DEG: (f64, f64) = (10.0, 3600.0);
-const FASTEST_DEG_S: (f64, f64) = (15.0, 3600.0);
+/// Least and most of the way, °: a ride at 5 °/s needs 8° to be even.
+pub const TRAVELS_DEG: (f64, f64) = (10.0, 3600.0);
+/// Least and most of the highest rate, °/s: C/K needs one well above 5.
+pub const FASTEST_DEG_S: (f64, f64) = (15.0, 3600.0);
 /// Rate of the crawl, °/s, its way, °, and where it begins: within the rides, which show friction there.
 const CRAWL_DEG_S: f64 = 0.5;
 const CRAWL_DEG: f64 = 5.0;
@@ -212,8 +213,15 @@ impl Axis {
         let actuator = plant.actuator();
         let gain = actuator.motor_gain();
         let most = spec.output.highest.min(-spec.output.lowest);
-        if !(actuator.kind().drives_above_0() && most > 0.0) {
-            return Err(ExperimentError::OneWay(spec.output.lowest));
+        if !actuator.kind().drives_above_0() {
+            return Err(ExperimentError::NoMotor);
+        }
+        let output = &spec.output;
+        if output.lowest >= 0.0 {
+            return Err(ExperimentError::OneWay("output.lowest_v", output.lowest, "below"));
+        }
+        if output.highest <= 0.0 {
+            return Err(ExperimentError::OneWay("output.highest_v", output.highest, "above"));
         }
         let least = 0.01 * most; // of a model without friction
         Ok(Axis {

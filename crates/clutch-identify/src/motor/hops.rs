@@ -4,9 +4,9 @@
 //! K/J and delay that explain the times of the edges best: a matter of their density, over all hops.
 
 use crate::Estimate;
-use crate::break_away::{Profile, spaced};
 use crate::confidence::FALL;
 use crate::filter::{Belief, Shaft};
+use crate::profile::{Profile, spaced};
 use crate::recording::Recording;
 use crate::ride;
 
@@ -45,6 +45,8 @@ pub struct Known {
     pub friction: [(f64, f64); 2],
     /// Root mean square of its ripple.
     pub ripple: f64,
+    /// Waves of the ripple per turn.
+    pub waves: f64,
     /// C/K, V s/rad.
     pub viscous: f64,
 }
@@ -132,7 +134,7 @@ impl Hop {
 /// Sum over the hops.
 fn density(hops: &[Hop], known: &Known, pull: f64, delay: f64) -> f64 {
     let each = hops.iter().map(|hop| {
-        let shaft = ride::shaft(&hop.recording, pull, known.viscous * pull, known.ripple);
+        let shaft = ride::shaft(&hop.recording, pull, known.viscous * pull, known.ripple, known.waves);
         hop.density(&shaft, delay, known.friction[usize::from(hop.backwards)])
     });
     each.sum::<f64>() / OVERRATED
@@ -212,5 +214,5 @@ pub fn guessed(recordings: &[Recording]) -> Known {
     volts.sort_by(f64::total_cmp);
     let middle = volts.get(volts.len() / 2).copied().unwrap_or(0.0);
     let friction = [(middle, 0.5 * middle); 2];
-    Known { friction, ripple: 0.1 * middle, viscous: 0.0 }
+    Known { friction, ripple: 0.1 * middle, waves: ride::WAVES_PER_TURN, viscous: 0.0 }
 }

@@ -1,7 +1,7 @@
 //! Passes at even rates, both ways, and the curve of friction through them.
 
 use crate::recording::Recording;
-use crate::ride::{Place, Told, WAVES_PER_TURN, rides};
+use crate::ride::{Place, Told, left_over, rides, waves};
 use nalgebra::{SMatrix, SVector};
 
 /// Share of the longest way that a pass has to go to show friction along the way.
@@ -22,8 +22,6 @@ const SLOW: f64 = 0.06;
 const ALIKE: f64 = 0.1;
 /// Rates that determine a slope lie this far apart, rad/s.
 const RATES_APART: f64 = 0.15;
-/// The rest of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
-const LEFT_OVER: f64 = 2.0;
 
 /// An even pass one way.
 #[derive(Clone, Debug)]
@@ -42,8 +40,11 @@ pub struct Pass {
 #[must_use]
 pub fn passes(views: &[Vec<Recording>; 2], pull: f64, delay: f64) -> Vec<Pass> {
     let mut found = Vec::new();
-    for (way, view) in views.iter().enumerate() {
-        let mut rides: Vec<_> = view.iter().flat_map(rides).collect();
+    let rides = views.each_ref().map(|view| view.iter().flat_map(rides).collect::<Vec<_>>());
+    // Both ways go over the same places.
+    let shown: Vec<_> = rides.iter().flatten().filter(|ride| ride.rate >= FINEST).collect();
+    let waves = waves(&shown, pull, delay);
+    for (way, mut rides) in rides.into_iter().enumerate() {
         // The longest way first, of these the slowest: it shows the ripple.
         let length = |r: &crate::ride::Ride<'_>| {
             r.recording.ticks[r.ticks.1].counts - r.recording.ticks[r.ticks.0].counts
@@ -53,7 +54,7 @@ pub fn passes(views: &[Vec<Recording>; 2], pull: f64, delay: f64) -> Vec<Pass> {
         rides.sort_by(|a, b| short(a).cmp(&short(b)).then(a.rate.total_cmp(&b.rate)));
         let mut share = None;
         for ride in rides {
-            let told = ride.told(pull, delay, share);
+            let told = ride.told(pull, delay, waves, share);
             share = share.or(Some(told.ripple.0));
             let r = ride.recording;
             let angle = |i: usize| r.ticks[i].counts as f64 * r.radians_per_count();
@@ -96,7 +97,11 @@ pub fn finest(passes: &[Pass], way: usize) -> Vec<Place> {
         .filter(|p| p.way == way && p.told.rate >= FINEST)
         .min_by(|a, b| a.told.rate.total_cmp(&b.told.rate));
     let Some(slow) = slow.filter(|slow| slow.told.rate < reference.told.rate) else { return whole.clone() };
-    let Some(factor) = mean(whole, slow.stretch) else { return whole.clone() };
+    // Of a wave as long as its way a pass does not know what is mean: the reference does.
+    let (Some(here), Some(own)) = (mean(whole, slow.stretch), mean(&slow.told.map, slow.stretch)) else {
+        return whole.clone();
+    };
+    let factor = here / own;
     slow.told.map.iter().map(|p| Place { factor: p.factor * factor, ..*p }).collect()
 }
 
@@ -113,7 +118,7 @@ impl Pass {
     /// Share of friction by which its stretch, whose ripple has no whole waves, may be off the mean of all places.
     #[must_use]
     pub fn left_over(&self) -> f64 {
-        LEFT_OVER * self.told.ripple.0 / (WAVES_PER_TURN * (self.stretch.1 - self.stretch.0)).max(1.0)
+        left_over(self.told.ripple.0, self.told.waves.per_turn * (self.stretch.1 - self.stretch.0))
     }
 
     /// Friction, V, over what it is on this stretch by the map of another pass, and its deviation.

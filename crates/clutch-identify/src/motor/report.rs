@@ -4,8 +4,8 @@ use super::hops::{self, Hop};
 use super::passes::{self, Curve, Pass};
 use super::slips::{self, Slip};
 use crate::Estimate;
-use crate::break_away::{Profile, spaced};
 use crate::confidence::{DEVIATIONS, FALL};
+use crate::profile::{Profile, spaced};
 use crate::recording::Recording;
 use crate::report::{Finding, refused};
 use crate::ride::Place;
@@ -15,6 +15,8 @@ use serde::Serialize;
 /// steps, the time from break-away to the first edge.
 const FEWEST_SLIPS: usize = 3;
 const CLOCKWORK: f64 = 7e-3;
+/// Share by which the time from break-away to the first edge may be another one than reckoned.
+const LATER: f64 = 1.0;
 /// The same of damping, which a disc without a ripple shows 1 to 3 % too high.
 const DRAG: f64 = 1.2e-2;
 /// Share of the rest of a ripple in the mean of a stretch by which both ways differ.
@@ -43,6 +45,8 @@ pub struct Report {
     pub delay: Finding,
     /// Root mean square of friction's variation along the way, as a share.
     pub ripple: Finding,
+    /// Waves of that ripple per turn, where passes show them.
+    pub waves: Option<f64>,
     /// Time constant of the actuator, s.
     pub lag: Finding,
     /// K, J, friction and load one by one.
@@ -99,7 +103,8 @@ impl Motion {
         let friction = [0, 1].map(|way| (curve.value[way], curve.deviation(way)));
         let share = self.ripple()?.0;
         let mean = 0.5 * (friction[0].0 + friction[1].0);
-        Some(hops::Known { friction, ripple: share * mean, viscous: curve.value[4].max(0.0) })
+        let waves = passes::reference(&self.passes, 0)?.told.waves.per_turn;
+        Some(hops::Known { friction, ripple: share * mean, waves, viscous: curve.value[4].max(0.0) })
     }
 
     /// Size of the ripple and its deviation: the mean of both ways.
@@ -119,23 +124,19 @@ impl Motion {
         let map = passes::finest(&self.passes, way);
         let load = 0.5 * (sliding[1] - sliding[0]) * [1.0, -1.0][way];
         let mean = 0.5 * (sliding[0] + sliding[1]);
-        let volts: Vec<f64> = self.slips[way]
+        let volts: Vec<(f64, f64)> = self.slips[way]
             .iter()
             .filter_map(|&(i, slip)| {
                 let r = &self.views[way][i];
                 let needed = slip.factor(r, &map)? * sliding[way];
                 // Friction alone changes along the way; a load does not.
                 let factor = (needed + load) / mean;
-                Some((slip.volts(r, pull, delay, needed) + load) / factor - load)
+                let (volts, below) = slip.volts(r, pull, delay, needed);
+                Some(((volts + load) / factor - load, below / factor))
             })
             .collect();
-        let n = volts.len();
-        if n < FEWEST_SLIPS {
-            return None;
-        }
-        let mean = volts.iter().sum::<f64>() / n as f64;
-        let square = volts.iter().map(|u| (u - mean) * (u - mean)).sum::<f64>() / (n - 1) as f64;
-        Some((mean, (square / n as f64 + (CLOCKWORK * mean).powi(2)).sqrt()))
+        let (volts, deviation) = at_no_ramp(&volts)?;
+        Some((volts, deviation.hypot(CLOCKWORK * volts)))
     }
 
     fn report(self, hops: usize) -> Report {
@@ -188,8 +189,12 @@ impl Motion {
                     Finding::Known(Estimate { value: share, low: (share - off).max(0.0), high: share + off })
                 },
             ),
+            waves: passes::reference(&self.passes, 0)
+                .map(|pass| pass.told.waves)
+                .filter(|waves| waves.seen)
+                .map(|waves| waves.per_turn),
             lag: refused(
-                "the delay holds dead time and lag together: steps of a finer encoder separate the two",
+                "the delay holds dead time and lag together, which no experiment of this verb separates; the voltage measured at the motor does",
             ),
             each: refused(
                 "counts and volts do not determine them, as all of them scaled alike move alike; a known torque at the shaft – a mass on a \
@@ -207,6 +212,31 @@ impl Motion {
             found: (hops, self.slips.iter().map(Vec::len).sum(), rates),
         }
     }
+}
+
+/// Friction at rest and its deviation, from the voltages of break-aways and those by which each is taken to lie below its first
+/// edge. A shaft whose friction falls slowly, or that slips within a count before, is later than reckoned, all alike as a share:
+/// slow ramps and fast ones together show by how much.
+fn at_no_ramp(slips: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = slips.len() as f64;
+    if slips.len() < FEWEST_SLIPS {
+        return None;
+    }
+    let mean = slips.iter().map(|slip| slip.0).sum::<f64>() / n;
+    let mut square = slips.iter().map(|slip| (slip.0 - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let mut found = (mean, 0.0);
+    for _ in 0..2 {
+        let weight = 1.0 / square.max(f64::MIN_POSITIVE);
+        let sum = |of: &dyn Fn(&(f64, f64)) -> f64| weight * slips.iter().map(of).sum::<f64>();
+        let (x, xx) = (sum(&|slip| slip.1), sum(&|slip| slip.1 * slip.1) + 1.0 / (LATER * LATER));
+        let (y, xy) = (sum(&|slip| slip.0), sum(&|slip| slip.0 * slip.1));
+        let d = weight * n * xx - x * x;
+        let (volts, later) = ((xx * y - x * xy) / d, (weight * n * xy - x * y) / d);
+        found = (volts, (xx / d).sqrt());
+        let off = |slip: &(f64, f64)| (slip.0 - volts - later * slip.1).powi(2);
+        square = slips.iter().map(off).sum::<f64>() / (n - 2.0).max(1.0);
+    }
+    Some(found)
 }
 
 /// The curve of friction with the Stribeck velocities that go with it.

@@ -2,7 +2,7 @@
 
 use super::Report;
 use crate::Estimate;
-use crate::rig_file::{Lacks, MOST_PERCENT, RIPPLE, around, intervals, need};
+use crate::rig_file::{Lacks, MOST_PERCENT, RIPPLE, around, identified, need};
 use crate::shown::MOTOR_ROWS;
 use clutch_core::Actuator;
 use clutch_sim::Scenario;
@@ -80,7 +80,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let file = Table::from_iter([
         ("model".to_owned(), Value::Table(model)),
         ("bounds".to_owned(), Value::Table(bounds)),
-        ("identified".to_owned(), Value::Table(intervals(&MOTOR_ROWS, report))),
+        ("identified".to_owned(), Value::Table(identified(&MOTOR_ROWS, report, report.waves))),
     ]);
     Ok(format!(
         "# Findings of `clutch identify` for: {}\n\

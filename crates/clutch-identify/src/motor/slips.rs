@@ -53,22 +53,22 @@ pub fn slips(recording: &Recording) -> Vec<Slip> {
 }
 
 impl Slip {
-    /// Voltage that broke it away, V, where it slides at `sliding` and K/J is `pull` (rad/s² per volt).
+    /// Voltage that broke it away, V, where it slides at `sliding` and K/J is `pull` (rad/s² per volt), and the voltage by which
+    /// that is taken to lie below the one at its first edge.
     #[must_use]
-    pub fn volts(&self, recording: &Recording, pull: f64, delay: f64, sliding: f64) -> f64 {
+    pub fn volts(&self, recording: &Recording, pull: f64, delay: f64, sliding: f64) -> (f64, f64) {
         let r = recording;
-        let late = |volts: f64| {
-            let a = (pull * (volts - sliding) * r.per_rad_s2()).max(1e-4);
-            FIRST_EDGE * (2.0 / a).sqrt() + 0.5 + delay / r.period
-        };
-        let before = |periods: f64| {
-            let time = (self.tick as f64 - periods).max(0.0);
-            let i = time as usize;
-            let part = time - i as f64;
-            // A staircase stands for a ramp.
-            (1.0 - part) * r.volts(i as isize - 1) + part * r.volts(i as isize)
-        };
-        before(late(r.ticks[self.tick - 1].volts))
+        let at_edge = r.ticks[self.tick - 1].volts;
+        let a = (pull * (at_edge - sliding) * r.per_rad_s2()).max(1e-4);
+        let late = FIRST_EDGE * (2.0 / a).sqrt();
+        let time = (self.tick as f64 - late - 0.5 - delay / r.period).max(0.0);
+        let i = time as usize;
+        let part = time - i as f64;
+        // A staircase stands for a ramp.
+        let volts = (1.0 - part) * r.volts(i as isize - 1) + part * r.volts(i as isize);
+        let rested = r.samples(RESTED);
+        let ramp = (at_edge - r.volts(self.tick as isize - 1 - rested as isize)) / rested as f64;
+        (volts, ramp * late)
     }
 
     /// Friction where it rested, over its mean, by a map whose angles rise; none beyond it.

@@ -219,7 +219,7 @@ impl Found {
                  1 kHz. Set it by hand: echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
             )),
             (None, Some(_)) if self.kind == DeviceKind::UsbSerial => Some(format!(
-                "{port}: {answer}, and the driver ({}) does not tell how long the adapter holds received bytes: an \
+                "{port}: {answer}, and the driver ({}) does not say how long the adapter holds received bytes: an \
                  FTDI adapter does for 16 ms. Look for /sys/bus/usb-serial/devices/{name}/latency_timer, and measure \
                  the round trip",
                 self.driver.as_deref().unwrap_or("unknown")

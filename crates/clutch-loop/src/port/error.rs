@@ -87,9 +87,17 @@ pub enum PortError {
         /// The system's answer.
         source: io::Error,
     },
-    /// The UNIX socket can be neither made nor opened.
-    #[error("unix://{}: {source}; start the board first, or name a file that does not exist, in a folder of yours", path.display())]
+    /// The UNIX socket of a board cannot be opened.
+    #[error("unix://{}: {source}; start the board first, or check the path", path.display())]
     Socket {
+        /// Its file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A UNIX socket cannot be made there.
+    #[error("unix://{}: {source}; name a file that does not exist, in a folder of yours", path.display())]
+    CannotMakeSocket {
         /// Its file.
         path: PathBuf,
         /// The system's answer.

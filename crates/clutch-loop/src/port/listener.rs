@@ -88,7 +88,7 @@ impl Listener {
     /// socket on which nobody listens any more gives way.
     ///
     /// # Errors
-    /// [`PortError::Socket`].
+    /// [`PortError::CannotMakeSocket`].
     pub fn bind_unix(path: &Path) -> Result<Self, PortError> {
         let listen = || -> io::Result<Listener> {
             let stale = std::fs::symlink_metadata(path).is_ok_and(|found| found.file_type().is_socket());
@@ -107,7 +107,7 @@ impl Listener {
             rustix::net::listen(&socket, 16)?;
             Ok(listener)
         };
-        listen().map_err(|source| PortError::Socket { path: path.to_owned(), source })
+        listen().map_err(|source| PortError::CannotMakeSocket { path: path.to_owned(), source })
     }
 
     /// The next connection that waits.

@@ -419,6 +419,21 @@ fn only_loopback_is_listened_on_unless_asked() {
     assert!(error.to_string().contains("nobody listens there; start the board first"), "{error}");
 }
 
+#[test]
+fn a_socket_in_a_file_tells_the_board_and_the_loop_what_each_can_do() {
+    let folder = temporary("sockets");
+    let file = folder.join("board");
+    let error = Port::open(&Address::Unix(file.clone()), &SerialOptions::default()).unwrap_err();
+    assert!(matches!(error, PortError::Socket { .. }), "{error:?}");
+    assert!(error.to_string().ends_with("; start the board first, or check the path"), "{error}");
+    let board = Listener::bind_unix(&file).unwrap();
+    let error = Listener::bind_unix(&file).err().unwrap();
+    assert!(matches!(error, PortError::CannotMakeSocket { .. }), "{error:?}");
+    assert!(error.to_string().contains("; name a file that does not exist"), "{error}");
+    drop(board);
+    fs::remove_dir_all(folder).unwrap();
+}
+
 // ---- what is refused ----
 
 #[test]

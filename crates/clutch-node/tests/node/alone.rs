@@ -285,7 +285,7 @@ fn a_program_that_begins_anew_after_a_fault_begins_as_faulted() {
     }
 }
 
-/// What the board is built into decides until a run has begun: not the safe state of a run that nobody asked for.
+/// The machine that the board is built into decides until a run has begun: not the safe state of a run that nobody asked for.
 #[test]
 fn a_fault_before_consent_leaves_the_boot_code() {
     for on_fault in [SafeState::ramp(2.0, 8.0), SafeState::Release, SafeState::hold_then_release(5.0, 0.1)] {

@@ -79,7 +79,7 @@ impl Gains {
                 ("pd_2", vec![key("law.pd.kp_v_rad", kp), key("law.pd.kd_v_s_rad", kd), smoothing(kappa)])
             }
             Gains::Pid(kp, ki, kd, kappa) => (
-                "pid_2",
+                "bench_pid_2",
                 vec![
                     ("rig.base".to_owned(), "paper".to_owned()),
                     key("law.pid.kp_v_rad", kp),

@@ -216,7 +216,7 @@ pub enum EngineError {
     /// Too many steps or events in one interval.
     #[error(
         "the motion after t = {time} s needs more than {limit} steps in one sampling period: \
-         a parameter of the rig is out of all proportion (a tiny inertia or Stribeck velocity, or a Stribeck exponent far from 1?)"
+         a parameter of the rig is out of all proportion (a tiny inertia or Stribeck velocity, stiff bristles, or a Stribeck exponent far from 1?)"
     )]
     TooManySteps {
         /// Start of the interval, s.

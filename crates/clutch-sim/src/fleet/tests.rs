@@ -98,7 +98,7 @@ fn shafts_in_lanes_have_the_bits_of_shafts_alone() {
         ("smc_2", &[("law", "{ smc_integral = {} }"), bench]),
         ("smc_2", &[("law", "{ dob = {} }"), ("rig.delay_ticks", "1")]),
         ("ctc_2", &[]),
-        ("pid_2", &[("rig.base", "\"paper\""), ("law.pid.derivative_time_s", "0.002"), bumpless]),
+        ("bench_pid_2", &[("rig.base", "\"paper\""), ("law.pid.derivative_time_s", "0.002"), bumpless]),
         ("motor_pid", &[]),
         ("motor_pid", &[("rig.actuator_time_constant_s", "0.003")]),
         ("bench_smc_2", &[]),

@@ -56,7 +56,7 @@ impl<V: Lane> Silence<V> {
             self.cycles = V::select(begins, self.cycles + V::ONE, self.cycles);
             self.stuck_ticks = V::select(begins, self.stuck_ticks + self.silent_ticks, self.stuck_ticks);
             self.stuck = lasts | begins;
-            // What was silent before settling has been added with the rest.
+            // The silence before settling has been added with the rest.
             self.before.1 = V::select(begins, self.before.1 + self.unheard, self.before.1);
             self.unheard = V::select(begins, V::ZERO, self.unheard);
         }

@@ -248,7 +248,7 @@ fn runs_in_lanes_have_the_bits_of_runs_alone() {
         ("pd_2", &[("rig.drive.weight.mass_kg", 0.1, 0.3)], &[("law", "{ hold = {} }")]),
         ("smc_2", &[("rig.friction.stribeck.mu_dynamic", 0.1, 0.2)], &[("law", "{ smc_sign = {} }")]),
         (
-            "pid_2",
+            "bench_pid_2",
             &[("law.pid.kp_v_rad", 500.0, 3000.0)],
             &[("rig.base", "\"paper\""), ("law.pid.kd_v_s_rad", "0")],
         ),
@@ -260,7 +260,7 @@ fn runs_in_lanes_have_the_bits_of_runs_alone() {
         ("pd_2", &pd, &[("rig.encoder.quantised", "false"), ("run.start", "rest")]),
         ("smc_2", &smc, &[]),
         ("ctc_2", &ctc, &[]),
-        ("pid_2", &[("law.pid.kp_v_rad", 500.0, 3000.0)], &[("rig.base", "\"paper\"")]),
+        ("bench_pid_2", &[("law.pid.kp_v_rad", 500.0, 3000.0)], &[("rig.base", "\"paper\"")]),
         ("motor_pid", &[("law.pid.kp_v_rad", 5.0, 60.0)], &[]),
         ("motor_smc", &[("law.smc.kp_v", 1.0, 3.0)], &[]),
     ];

@@ -213,7 +213,7 @@ impl Case {
             .into_iter()
             .enumerate()
             .map(|(i, e)| {
-                let at = format!("expect[{i}]");
+                let at = format!("expect[{}]", i + 1);
                 if !e.value.is_finite() {
                     return Err(wrong(format!("{at}.value = {}: expected a finite number", e.value)));
                 }
@@ -298,11 +298,11 @@ fn mechanism(origin: &str, file: MechanismFile) -> Result<Mechanism, CaseError> 
         return Err(wrong(format!("mechanism.load: {} lists; expected {n}, one for each joint", load.len())));
     }
     for (i, s) in load.iter().enumerate() {
-        signal(&format!("load[{i}]"), s)?;
+        signal(&format!("load[{}]", i + 1), s)?;
     }
     let mut rows = Vec::new();
     for (i, row) in file.row.into_iter().enumerate() {
-        let at = format!("mechanism.row[{i}]");
+        let at = format!("mechanism.row[{}]", i + 1);
         if row.joints.len() != n || row.joints.iter().any(|x| !x.is_finite()) {
             let joints = &row.joints;
             return Err(wrong(format!(
@@ -320,7 +320,7 @@ fn mechanism(origin: &str, file: MechanismFile) -> Result<Mechanism, CaseError> 
                 row.base_velocity
             )));
         }
-        signal(&format!("row[{i}].normal"), &row.normal)?;
+        signal(&format!("row[{}].normal", i + 1), &row.normal)?;
         let (friction, told) = friction(origin, &format!("{at}.friction"), row.friction)?;
         let (joints, base_velocity, normal) = (row.joints, row.base_velocity, row.normal);
         rows.push(Row { joints, base_velocity, normal, friction, told });

@@ -47,27 +47,35 @@ impl Scenario {
                 (tick as f64 * period, target.position.minus::<f64>(FixedCounts(0)) * radians);
             let drive = rig.drive.torque(time, angle);
             let asked = plant.inertia * target.acceleration + plant.viscous_damping * target.velocity;
-            let given = given[usize::from(target.velocity < 0.0)];
+            let backwards = target.velocity < 0.0;
+            let given = given[usize::from(backwards)];
             looks += 1;
             if asked >= drive - noise + given.low && asked <= drive + noise + given.high {
                 continue;
             }
             cannot += 1;
-            first.get_or_insert((time, drive, asked, given));
+            first.get_or_insert((time, drive, asked, given, backwards));
         }
         let share = f64::from(cannot) / f64::from(looks.max(1));
-        Ok(first.filter(|_| share > SELDOM).map(|(time, drive, asked, given)| {
+        Ok(first.filter(|_| share > SELDOM).map(|(time, drive, asked, given, backwards)| {
             let when = if cannot == looks {
                 String::new()
             } else {
                 format!(" for {:.0} % of the run, first at {} s", 100.0 * share, number(time))
             };
-            reason(&bounds, &when, drive, asked, &given)
+            reason(bounds.actuator, &when, drive, asked, &given, backwards)
         }))
     }
 }
 
-fn reason(bounds: &Bounds, when: &str, drive: f64, asked: f64, given: &Interval) -> String {
+fn reason(
+    actuator: ActuatorKind,
+    when: &str,
+    drive: f64,
+    asked: f64,
+    given: &Interval,
+    backwards: bool,
+) -> String {
     let torques = format!(
         "rig.drive gives {} N m, rig.actuator and friction {} to {} N m, and [reference] takes {} N m",
         number(drive),
@@ -75,10 +83,16 @@ fn reason(bounds: &Bounds, when: &str, drive: f64, asked: f64, given: &Interval)
         number(given.high),
         number(asked)
     );
-    let change = match (asked > drive + given.high, bounds.actuator) {
+    // Seen along the path: what is wanted beyond the most, or the least, that drive and actuator give.
+    let (drive, asked, most) =
+        if backwards { (-drive, -asked, -drive - given.low) } else { (drive, asked, drive + given.high) };
+    let change = match (asked > most, actuator) {
         // Without the drag that no voltage lifts the drive would do.
         (true, ActuatorKind::Brake) if asked <= drive => {
             "let rig.drive turn the shaft with more, or lower rig.actuator.brake.preload_nm"
+        }
+        (true, ActuatorKind::Brake) if drive > 0.0 => {
+            "let rig.drive turn the shaft with more, or lower rig.viscous_damping_nm_s_rad or the path's rate"
         }
         (true, ActuatorKind::Brake) => {
             "let rig.drive turn the shaft the path's way, or give rig and model a motor"

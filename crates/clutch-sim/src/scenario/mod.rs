@@ -3,6 +3,7 @@
 //! The rig begins as a copy of the one that `rig.base` names; every key in the file overrides
 //! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
 
+mod another_loop;
 mod cannot_follow;
 pub mod describe;
 mod outside;
@@ -21,6 +22,7 @@ pub use section::check_section;
 pub use verdict::{CERTIFIED, CertificateError, Proven, STICKS, Sampled, Unproven};
 pub use written::written_value;
 
+use crate::engine::EngineError;
 use crate::friction_map::MapGrid;
 use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
@@ -28,7 +30,8 @@ use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use crate::scenario_error::ScenarioError;
 use crate::tables::{
-    self, Place, check, checked, complete, find, lookup, nearest, read, shown, with_todays_keys,
+    self, Place, check, checked, complete, default_value, find, lookup, nearest, numbers, read, shown,
+    with_todays_keys,
 };
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
@@ -78,7 +81,6 @@ built_in!(
     "pd_2",
     "ctc_2",
     "smc_2",
-    "pid_2",
     "motor_pid",
     "motor_pid_coulomb",
     "motor_smc",
@@ -86,6 +88,7 @@ built_in!(
     "motor_glide",
     "slide_pid",
     "bench_pd_2",
+    "bench_pid_2",
     "bench_smc_2",
     "bench_glide_2",
     "bench_dob_2",
@@ -298,6 +301,12 @@ impl Scenario {
         Place::of(&self.params, key).map(|place| place.row)
     }
 
+    /// True for a key that takes a whole number.
+    #[must_use]
+    pub fn takes_whole(&self, key: &str) -> bool {
+        self.row(key).is_some_and(|row| matches!(row.kind, Kind::Whole))
+    }
+
     /// An error about a key that is there.
     pub(crate) fn refuse(&self, key: &str, message: &str) -> ScenarioError {
         self.message(key, message.to_owned())
@@ -391,12 +400,20 @@ impl Scenario {
         let nested = <ScenarioParams as Params<f64>>::INFO.table().map_or(&[][..], |file| file.nested);
         // The rig, which comes first, last: of a table that rig and model both have, the model's is what laws, bounds
         // and certificate refuse. Errors of a rig come with its section.
-        let mut below = nested.iter().rev().filter(|below| section.is_empty() || below.key == section);
-        let path = below.find_map(|below| {
+        let below = nested.iter().rev().filter(|below| section.is_empty() || below.key == section);
+        let places = below.filter_map(|below| {
             find(below.info, below.key, self.table().get(below.key)?.as_table()?, e.table.id())
         });
-        let path = path.unwrap_or_else(|| section.to_owned());
-        error_of(&self.origin, &path, self.table(), &e.cast())
+        let places: Vec<String> = places.collect();
+        // Where two sections have such a table, as law and velocity a filter, the value says which it is.
+        let has_it = |path: &&String| {
+            let row = e.row()?;
+            let here = lookup(self.table(), &format!("{path}.{}", row.key))?.as_float()?;
+            let value = e.value.to_f64();
+            Some((row.unit.to_si(here) - value).abs() <= 1e-6 * value.abs())
+        };
+        let path = places.iter().find(|path| has_it(path) == Some(true)).or(places.first());
+        error_of(&self.origin, path.map_or(section, String::as_str), self.table(), &e.cast())
     }
 
     fn message(&self, key: &str, message: String) -> ScenarioError {
@@ -534,11 +551,22 @@ impl Scenario {
 
     /// As [`Scenario::at`], of a part in the servo's scalar: what single precision cannot hold is said so.
     fn single<T: Real>(&self, section: &str, e: &ParamError<T>) -> ScenarioError {
-        let mut error = self.at(section, e);
-        if self.scalar() == ScalarKind::F32 && e.relation == 0 {
-            error.message.push_str(", in single precision (sampling.scalar = \"f32\")");
+        match self.scalar() {
+            ScalarKind::F32 if e.relation == 0 => self.in_single(section, e),
+            _ => self.at(section, e),
         }
+    }
+
+    fn in_single<T: Real>(&self, section: &str, e: &ParamError<T>) -> ScenarioError {
+        let mut error = self.at(section, e);
+        error.message.push_str(", in single precision (sampling.scalar = \"f32\")");
         error
+    }
+
+    /// The error of a part that double precision took when the scenario was read, and the loop's scalar does not take.
+    #[must_use]
+    pub fn refused_in_single<T: Real>(&self, e: &ParamError<T>) -> ScenarioError {
+        self.in_single("", e)
     }
 
     /// Its title.
@@ -598,6 +626,20 @@ impl Scenario {
         let mut out = Vec::new();
         walk(self.table(), "", &mut out);
         out
+    }
+
+    /// The number of the rig that is farthest from its default in ratio, by its key, and that default.
+    fn farthest_of_the_rig(&self) -> Option<(String, String, &'static str)> {
+        let rig = <ScenarioParams as Params<f64>>::INFO.table()?.nested.iter().find(|n| n.key == "rig")?;
+        let mut all = Vec::new();
+        numbers(rig.info, rig.key, self.table().get(rig.key)?.as_table()?, &mut all);
+        let far = |(row, key, x): (&'static Row, String, f64)| {
+            let ratio = (x / default_value(row)?.as_float()?).abs();
+            let far = ratio.max(1.0 / ratio);
+            (far.is_finite() && far > 1.0).then(|| (far, (key, x.to_string(), row.default)))
+        };
+        let farthest = all.into_iter().filter_map(far).max_by(|a, b| a.0.total_cmp(&b.0));
+        farthest.map(|(_, number)| number)
     }
 
     /// The scenario as TOML with every default filled in; parsing it gives the same scenario.
@@ -757,6 +799,13 @@ impl Scenario {
             RunError::Engine { asked, expected } => {
                 ScenarioError::value(&self.origin, "run.engine", &format!("{:?}", asked.name()), expected)
             }
+            RunError::Motion(EngineError::TooManySteps { .. }) => match self.farthest_of_the_rig() {
+                Some((key, value, default)) => {
+                    let message = format!("{e}; this number is the farthest from its default, {default}");
+                    ScenarioError::new(&self.origin, &key, &value, message)
+                }
+                None => self.message("rig", e.to_string()),
+            },
             RunError::Motion(_) => self.message("rig", e.to_string()),
             RunError::Begin(_) => self.path_message(e.to_string()),
             RunError::OtherServo => self.message("", e.to_string()),

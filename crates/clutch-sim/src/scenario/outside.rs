@@ -5,6 +5,7 @@ use crate::number;
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use clutch_core::friction::FrictionModel;
+use clutch_core::params::{KG_M2, NM, NM_S_RAD, NM_V, NONE, Unit};
 use clutch_core::{Bounds, Interval};
 
 /// Lines on what lies outside.
@@ -13,7 +14,7 @@ struct Outside(Vec<String>);
 
 impl Outside {
     /// A quantity that the rig has from one value to another, against its bound.
-    fn check(&mut self, name: &str, unit: &str, low: f64, high: f64, bound: &Interval) {
+    fn check(&mut self, name: &str, unit: Unit, low: f64, high: f64, bound: &Interval) {
         // A hair's breadth for what °, % and products round.
         let slack = 1e-9 * bound.high.abs();
         if low < bound.low - slack || high > bound.high + slack {
@@ -21,12 +22,13 @@ impl Outside {
                 if b - a <= slack { format!("{a:.5}") } else { format!("{a:.5} … {b:.5}") }
             };
             let found = if (high - low).is_finite() { range(low, high) } else { "of any size".to_owned() };
-            let (gap, bounds) = (if unit.is_empty() { "" } else { " " }, range(bound.low, bound.high));
+            let (unit, bounds) = (unit.text, range(bound.low, bound.high));
+            let gap = if unit.is_empty() { "" } else { " " };
             self.0.push(format!("{name} is {found}, bounds {bounds}{gap}{unit}"));
         }
     }
 
-    fn exactly(&mut self, name: &str, unit: &str, value: f64, bound: f64) {
+    fn exactly(&mut self, name: &str, unit: Unit, value: f64, bound: f64) {
         self.check(name, unit, value, value, &Interval { low: bound, high: bound });
     }
 }
@@ -41,20 +43,20 @@ impl Scenario {
         let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
         let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
         let mut lines = Outside::default();
-        lines.check("inertia", "kg m²", p.inertia, p.inertia, &bounds.inertia);
+        lines.check("inertia", KG_M2, p.inertia, p.inertia, &bounds.inertia);
         self.drive(&rig, bounds, &mut lines);
         lines.check(
             "viscous damping",
-            "N m s/rad",
+            NM_S_RAD,
             p.viscous_damping,
             p.viscous_damping,
             &bounds.viscous_damping,
         );
         let (brake, motor) = (actuator.brake_gain(), actuator.motor_gain());
-        lines.check("brake gain", "N m/V", brake, brake, &bounds.brake_gain);
-        lines.check("motor gain", "N m/V", motor, motor, &bounds.motor_gain);
-        lines.exactly("preload", "N m", actuator.preload(), bounds.preload);
-        lines.exactly("load share", "", actuator.load_share(), bounds.load_share);
+        lines.check("brake gain", NM_V, brake, brake, &bounds.brake_gain);
+        lines.check("motor gain", NM_V, motor, motor, &bounds.motor_gain);
+        lines.exactly("preload", NM, actuator.preload(), bounds.preload);
+        lines.exactly("load share", NONE, actuator.load_share(), bounds.load_share);
         self.friction(&rig, bounds, &mut lines);
         self.time(&mut lines);
         Ok(lines.0)
@@ -85,13 +87,13 @@ impl Scenario {
             let name = format!("driving torque ± {NOISE_ROOTS} · {} N m of noise", number(noise));
             lines.check(
                 &name,
-                "N m",
+                NM,
                 low - NOISE_ROOTS * noise,
                 high + NOISE_ROOTS * noise,
                 &bounds.drive_torque,
             );
         } else {
-            lines.check("driving torque", "N m", low, high, &bounds.drive_torque);
+            lines.check("driving torque", NM, low, high, &bounds.drive_torque);
         }
     }
 
@@ -103,15 +105,15 @@ impl Scenario {
             ("dynamic friction", model.sliding(), &bounds.friction_sliding),
         ];
         for (name, mu, bound) in kinds {
-            lines.check(name, "", mu * (1.0 - swing), mu * (1.0 + swing), bound);
+            lines.check(name, NONE, mu * (1.0 - swing), mu * (1.0 + swing), bound);
         }
         let known = &self.params.bounds;
         if let Some(share) = known.ripple {
             // The change along the disc, and the mean that is left, have bounds of their own.
             for (name, mean, bound) in kinds {
-                lines.check(&format!("mean {name}"), "", mean, mean, &known.mean_of(bound));
+                lines.check(&format!("mean {name}"), NONE, mean, mean, &known.mean_of(bound));
             }
-            lines.check("ripple of friction", "", swing, swing, &Interval { low: 0.0, high: share });
+            lines.check("ripple of friction", NONE, swing, swing, &Interval { low: 0.0, high: share });
         }
         if model.bristles().is_some_and(|b| b.damps()) {
             lines.0.push("friction has bristles with damping, bounds that of steady sliding".to_owned());

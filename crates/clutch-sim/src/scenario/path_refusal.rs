@@ -69,7 +69,7 @@ impl Scenario {
                     Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
                 })
     }
-    /// What a motor lacks that needs so many volts, of which its output gives fewer, and what takes most of them.
+    /// The lack of a motor that needs so many volts, of which its output gives fewer, and what takes most of them.
     fn motor_lacks(&self, path: &Reference<'_, f64>, bounds: &Bounds, asked: f64, available: f64) -> String {
         let p = &self.params;
         let period = p.sampling.sampling.period;

@@ -1,6 +1,7 @@
 //! The sampled loop of a scenario, and the box of plants around it: what a sampled-data certificate speaks of.
 
 use super::{Scenario, ScenarioBounds};
+use crate::number;
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::run::Start;
@@ -26,11 +27,11 @@ pub struct NotCovered {
     /// Its value there.
     pub what: String,
     /// The values that are covered.
-    pub covered: &'static str,
+    pub covered: String,
 }
 
-fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> NotCovered {
-    NotCovered { key, what: what.into(), covered }
+fn not(key: &'static str, what: impl Into<String>, covered: impl Into<String>) -> NotCovered {
+    NotCovered { key, what: what.into(), covered: covered.into() }
 }
 
 /// Gains, on a ramp forwards, of a law that has a sampled certificate of its own, within an output's limits, V; `motor` if it
@@ -49,6 +50,14 @@ pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2], motor: bool) -
         SampledForm::Layer { .. } if motor => return None,
         SampledForm::Layer { kp, kd, slope, boundary } => Gains::Layer { kp, kd, slope, boundary },
     })
+}
+
+/// Laws that have a sampled certificate of their own, in words.
+pub(super) fn sampled_laws(motor: bool) -> String {
+    let all = LawParams::all();
+    let covered = all.iter().filter(|law| gains(law, 0.0, [0.0; 2], motor).is_some());
+    let words = covered.map(|law| format!("{} {}", law.title(), law.sampled_if()).trim_end().to_owned());
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// Lowest voltage of a motor that surely turns no shaft of the box round, V: friction holds what motor and load push backwards, and a
@@ -172,19 +181,19 @@ impl Scenario {
         }
         // Other paths are refused, whatever the law gives on them.
         let rate = if let ReferenceParams::Ramp(ramp) = self.params.reference { ramp.rate } else { 0.0 };
-        let covered = if motor {
-            "PD (4), PID without derivative_time_s, and any law in a [shell], with a motor"
-        } else {
-            "PD (4), PID without derivative_time_s, SMC (31), and any law in a [shell]"
-        };
         let limits = self.limits();
-        let gains = gains(law, rate, limits, motor).ok_or_else(|| not("law", law.title(), covered))?;
+        let covered = || {
+            let with = if motor { ", with a motor" } else { "" };
+            format!("{}, and any law in a [shell]{with}", sampled_laws(motor))
+        };
+        let gains = gains(law, rate, limits, motor).ok_or_else(|| not("law", law.title(), covered()))?;
         // The law takes back what a limit cuts off such a voltage.
         match gains {
             Gains::Linear { forward, .. } | Gains::Integral { forward, .. }
                 if !(limits[0]..=limits[1]).contains(&forward) =>
             {
-                Err(not("law.pid", "a feed-forward beyond the output's limits", "one within them"))
+                let what = format!("a law's {} V without an error, beyond the limits", number(forward));
+                Err(not("output", what, "a voltage within them"))
             }
             gains => Ok(gains),
         }

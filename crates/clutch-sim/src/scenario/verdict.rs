@@ -1,12 +1,13 @@
 //! Verdicts on the sampled loop, each with its scope: the error bound, linear stability.
 
-use super::Scenario;
-use super::sampled::{AT_ONCE, NotCovered, gains};
+use super::sampled::{AT_ONCE, NotCovered, gains, sampled_laws};
+use super::{Scenario, another_loop};
 use crate::number;
 use clutch_certificate::checker::{self, Checked, Refused};
 use clutch_certificate::file::{self, FileError};
 use clutch_certificate::{Certificate, Gains, Options, Setup, Stability, largest, search, stability};
 use clutch_core::Bounds;
+use clutch_core::params::{KG_M2, NM, NM_S_RAD, NM_V, NONE};
 use std::path::Path;
 
 /// The name of the verdict in continuous time: a column of a sweep, a field of a loop's summary, an entry of its log.
@@ -44,11 +45,11 @@ pub enum CertificateError {
     #[error(transparent)]
     NotCovered(#[from] NotCovered),
     /// The certificate is another loop's.
-    #[error("{name}: the certificate is another loop's; scenario and file differ in\n  {}", .differences.join("\n  "))]
+    #[error("{name}: the certificate is another loop's; they differ in these, the scenario's value first:\n  {}", .differences.join("\n  "))]
     Other {
         /// The file.
         name: String,
-        /// Keys with both values, the scenario's first.
+        /// Quantities with both values, the scenario's first.
         differences: Vec<String>,
     },
     /// The proof does not hold.
@@ -149,7 +150,7 @@ impl Sampled {
         let certificate = file::read(path)?;
         let setup = self.setup.as_ref().map_err(NotCovered::clone)?;
         let name = path.display().to_string();
-        let differences = setup.differences(&certificate.setup);
+        let differences = another_loop::differences(setup, &certificate.setup);
         if !differences.is_empty() {
             return Err(CertificateError::Other { name, differences });
         }
@@ -180,6 +181,25 @@ impl Sampled {
             checked.limiting[1],
             self.scope()
         )
+    }
+
+    /// The verdict on the error with its scope, or that there is none.
+    #[must_use]
+    pub fn bound_if_any(&self, proven: Option<&Proven>) -> String {
+        let none = || "the bound of the error is uncertified: no certificate was given".to_owned();
+        proven.map_or_else(none, |proven| self.bound_line(proven))
+    }
+
+    /// The verdicts with their scopes, each by its name in a log. `certified`: in continuous time.
+    #[must_use]
+    pub fn verdicts(&self, certified: bool, proven: Option<&Proven>) -> [(String, String); 4] {
+        [
+            (CERTIFIED, certified.to_string()),
+            ("as_sampled", self.bound_if_any(proven)),
+            ("linear_stability", self.stability_line()),
+            ("sticks", STICKS.to_owned()),
+        ]
+        .map(|(name, verdict)| (name.to_owned(), verdict))
     }
 
     /// The verdicts in a line of a table: on the error with the box of its bound, on linear stability, on sticks.
@@ -220,7 +240,7 @@ impl Sampled {
             }
             (None, Err(why)) => why.to_string(),
             (None, Ok(_)) => {
-                "linear stability is not known: it is computed for PD (4) and SMC (31)".to_owned()
+                format!("linear stability is not known: it is computed for {}", sampled_laws(false))
             }
         }
     }
@@ -239,20 +259,17 @@ fn ticks(s: &Setup) -> String {
 fn short_scope(s: &Setup) -> String {
     let (name, gain) = gain(s);
     let sides = [
-        ("mu_d", s.sliding, ""),
-        ("mu_s", s.at_rest, ""),
-        ("T_u", s.drive_torque, " N m"),
-        (name, gain, " N m/V"),
-        ("J", s.inertia, " kg m²"),
-        ("C_d", s.viscous_damping, " N m s/rad"),
+        ("mu_d", s.sliding, NONE),
+        ("mu_s", s.at_rest, NONE),
+        ("T_u", s.drive_torque, NM),
+        (name, gain, NM_V),
+        ("J", s.inertia, KG_M2),
+        ("C_d", s.viscous_damping, NM_S_RAD),
     ];
     let mut parts = vec![format!("a ramp at {} °/s", number(s.rate.to_degrees())), ticks(s)];
-    parts.extend(
-        sides
-            .into_iter()
-            .filter(|(_, side, _)| !exact(*side))
-            .map(|(name, [low, high], unit)| format!("{name} {} … {}{unit}", number(low), number(high))),
-    );
+    parts.extend(sides.into_iter().filter(|(_, side, _)| !exact(*side)).map(|(name, [low, high], unit)| {
+        format!("{name} {} … {} {}", number(low), number(high), unit.text).trim_end().to_owned()
+    }));
     if s.ripple > 0.0 {
         parts.push(format!("±{} % along the disc", number(100.0 * s.ripple)));
     }

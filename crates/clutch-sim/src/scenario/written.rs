@@ -4,12 +4,18 @@ use crate::scenario_error::ScenarioError;
 use crate::tables::shown;
 use toml::{Table, Value};
 
-/// A value, written as in the file; a bare word is a string, as shells make quoting hard.
+/// A value, written as in the file; a bare word is a string, as shells make quoting hard. A whole number with more digits than TOML
+/// has for one is a number, too: its key says whether it is in range.
 #[must_use]
 pub fn written_value(text: &str) -> Option<Value> {
     let word = || text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let digits = text.strip_prefix(['+', '-']).unwrap_or(text);
     match format!("x = {text}").parse::<Table>() {
         Ok(mut table) => table.remove("x"),
+        // Leading zeros are a mistake, as in the file.
+        Err(_) if digits.bytes().all(|c| c.is_ascii_digit()) && digits.starts_with(|c| c != '0') => {
+            text.parse().ok().map(Value::Float)
+        }
         Err(_) => word().then(|| Value::String(text.into())),
     }
 }
@@ -51,4 +57,34 @@ pub(super) fn set(origin: &str, table: &mut Table, key: &str, value: Value) -> R
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scenario;
+
+    #[test]
+    fn a_whole_number_with_too_many_digits_is_out_of_range() {
+        for (key, expected) in [
+            ("run.seed", "a whole number from 0 to 9"),
+            ("rig.delay_ticks", "a whole number from 0 to 1000 p"),
+        ] {
+            for many in ["99999999999999999999", "-99999999999999999999"] {
+                let set = [(key.to_owned(), many.to_owned())];
+                let told = Scenario::load("smc_2".as_ref(), &set).unwrap_err().to_string();
+                assert!(
+                    told.contains(&format!(
+                        "{key} = {}1000000",
+                        if many.starts_with('-') { "-" } else { "" }
+                    )),
+                    "{told}"
+                );
+                assert!(told.contains(&format!("expected {expected}")), "{told}");
+            }
+        }
+        assert_eq!(written_value("007"), Some(Value::String("007".into())));
+        assert_eq!(written_value("-12"), Some(Value::Integer(-12)));
+        assert_eq!(written_value("-0x"), None);
+    }
 }

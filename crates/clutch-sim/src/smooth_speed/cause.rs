@@ -21,7 +21,7 @@ pub const ENCODER_LIMIT: f64 = 2.0;
 /// A reason why a rate is not smooth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Cause {
+pub enum Wall {
     /// The linear sampled loop is unstable.
     SampledLoop,
     /// Friction falls faster with the speed than the law brakes.
@@ -34,10 +34,10 @@ pub enum Cause {
     Ripple,
 }
 
-impl Cause {
+impl Wall {
     /// Every cause, in the order in which they are reported.
-    pub const ALL: [Cause; 5] =
-        [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt, Cause::Ripple];
+    pub const ALL: [Wall; 5] =
+        [Wall::SampledLoop, Wall::StribeckEdge, Wall::EncoderEdge, Wall::EdgeJolt, Wall::Ripple];
 }
 
 /// The ground from which the causes follow, at a rate.
@@ -46,7 +46,7 @@ pub struct Evidence {
     /// The rate, °/s.
     pub rate_deg_s: f64,
     /// The causes that hold at this rate.
-    pub causes: Vec<Cause>,
+    pub causes: Vec<Wall>,
     /// Spectral radius of the linear sampled loop with the rig's mean friction; none where it is not known.
     pub spectral_radius: Option<f64>,
     /// Reason why the spectral radius is not known.
@@ -100,16 +100,16 @@ impl Evidence {
         let differs = matches!(p.velocity, VelocityParams::SmoothedDerivative(_)) && p.law.filter().is_none();
         let jolt = count.zip(damping).filter(|_| differs).map(|(count, damping)| damping * count / inertia);
         let between = falling.zip(edge_time).map(|(falling, time)| (falling + along) * time);
-        let holds = |cause: &Cause| match cause {
-            Cause::SampledLoop => radius.is_some_and(|radius| radius > 1.0),
-            Cause::StribeckEdge => edge.is_some_and(|edge| rate < edge),
-            Cause::EncoderEdge => between.is_some_and(|growth| growth > ENCODER_LIMIT),
-            Cause::EdgeJolt => jolt.is_some_and(|jolt| rate < jolt),
-            Cause::Ripple => false,
+        let holds = |cause: &Wall| match cause {
+            Wall::SampledLoop => radius.is_some_and(|radius| radius > 1.0),
+            Wall::StribeckEdge => edge.is_some_and(|edge| rate < edge),
+            Wall::EncoderEdge => between.is_some_and(|growth| growth > ENCODER_LIMIT),
+            Wall::EdgeJolt => jolt.is_some_and(|jolt| rate < jolt),
+            Wall::Ripple => false,
         };
         Ok(Evidence {
             rate_deg_s,
-            causes: Cause::ALL.into_iter().filter(holds).collect(),
+            causes: Wall::ALL.into_iter().filter(holds).collect(),
             spectral_radius: radius,
             not_covered,
             stribeck_edge_deg_s: edge.map(f64::to_degrees),
@@ -134,7 +134,7 @@ impl Evidence {
         if let Some(failed) = failed.filter(|_| self.causes.is_empty() && uneven) {
             let smooth = scenario.even_disc(failed.rate_deg_s, failed.seed, report)?.is_none();
             self.even_disc_smooth = Some(smooth);
-            self.causes.extend(smooth.then_some(Cause::Ripple));
+            self.causes.extend(smooth.then_some(Wall::Ripple));
         }
         Ok(self)
     }

@@ -123,7 +123,7 @@ pub fn rate_map(
 
 /// A key with its value, which is a whole number where the key asks for one.
 fn set(scenario: &Scenario, axis: &Axis, value: f64) -> (String, Value) {
-    let whole = scenario.row(&axis.key).is_some_and(|row| matches!(row.kind, Kind::Whole));
+    let whole = scenario.takes_whole(&axis.key);
     let value =
         if whole && value.fract() == 0.0 { Value::Integer(value as i64) } else { Value::Float(value) };
     (axis.key.clone(), value)
@@ -139,6 +139,11 @@ fn told<T>(report: Report<'_>, total: u64, cell: Result<T, ScenarioError>) -> Re
 fn check_axes(scenario: &Scenario, axes: &[&Axis]) -> Result<(), ScenarioError> {
     check(scenario)?;
     for axis in axes {
+        if [RATE, "run.seed"].contains(&axis.key.as_str()) {
+            return Err(
+                scenario.refuse(&axis.key, "expected another key: a map has rates and seeds of its own")
+            );
+        }
         if axis.values.is_empty() {
             return Err(scenario.refuse(&axis.key, "expected at least one value"));
         }

@@ -9,7 +9,7 @@ mod cause;
 mod failure;
 mod map;
 
-pub use cause::{Cause, ENCODER_LIMIT, Evidence};
+pub use cause::{ENCODER_LIMIT, Evidence, Wall};
 pub use failure::{Failing, Failure};
 pub use map::{Axis, Column, GainMap, RateMap, Tried, gain_map, law_keys, rate_map};
 
@@ -99,7 +99,7 @@ pub struct SmoothSpeed {
     /// The lowest rate at which every disc is smooth, °/s; none if there is no such rate.
     pub rate_deg_s: Option<f64>,
     /// The first of the causes that hold at the rate below; none if none does, or no rate below was tried.
-    pub cause: Option<Cause>,
+    pub cause: Option<Wall>,
     /// The run that was not smooth at the next lower rate; none if it was smooth at the lowest.
     pub below: Option<Failure>,
     /// Rates above the lowest smooth one that are not smooth, with the first run that showed it.

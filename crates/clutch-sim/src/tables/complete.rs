@@ -73,8 +73,7 @@ pub(crate) fn complete_table(
                     whole.insert((*key).to_owned(), value);
                 }
                 None if !row.default.is_empty() => {
-                    let default = format!("x = {}", row.default).parse::<Table>();
-                    let value = default.ok().and_then(|mut t| t.remove("x")).unwrap_or(Value::Boolean(false));
+                    let value = default_value(row).unwrap_or(Value::Boolean(false));
                     whole.insert((*key).to_owned(), in_kind(row.kind, value));
                 }
                 None if row.optional => {}
@@ -324,6 +323,11 @@ pub(crate) fn shown(value: &Value) -> String {
     }
 }
 
+/// Default of a row; none of one that has to be given, or may be absent.
+pub(crate) fn default_value(row: &Row) -> Option<Value> {
+    format!("x = {}", row.default).parse::<Table>().ok()?.remove("x")
+}
+
 /// The value at a dotted key.
 pub(crate) fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
     let mut parts = path.split('.');
@@ -332,6 +336,41 @@ pub(crate) fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
         value = value.as_table()?.get(part)?;
     }
     Some(value)
+}
+
+/// Each real number of a table that is complete: its row, its key and its value there.
+pub(crate) fn numbers(
+    info: &'static Info,
+    path: &str,
+    table: &Table,
+    out: &mut Vec<(&'static Row, String, f64)>,
+) {
+    fn in_table(
+        info: &'static TableInfo,
+        path: &str,
+        table: &Table,
+        out: &mut Vec<(&'static Row, String, f64)>,
+    ) {
+        let real = |row: &'static Row| Some((row, join(path, row.key), table.get(row.key)?.as_float()?));
+        out.extend(info.rows.iter().filter_map(real));
+        for below in info.nested {
+            match (below.info, table.get(below.key).and_then(Value::as_table)) {
+                (Info::Table(flat), _) if below.key.is_empty() => in_table(flat, path, table, out),
+                (inner, Some(within)) => numbers(inner, &join(path, below.key), within, out),
+                (_, None) => {}
+            }
+        }
+    }
+    match info {
+        Info::Table(info) => in_table(info, path, table, out),
+        Info::Choice(choice) => {
+            for option in choice.options {
+                if let Some(within) = table.get(option.key).and_then(Value::as_table) {
+                    in_table(option.table, &join(path, option.key), within, out);
+                }
+            }
+        }
+    }
 }
 
 /// Path of the table of this number (none where its option is not chosen), at or below `info`.

@@ -9,12 +9,15 @@ mod leaves;
 mod read;
 mod set;
 mod suggest;
+mod write;
 
 pub(crate) use check::check;
 pub(crate) use complete::{
-    checked, complete, complete_table, default_of, find, lookup, pair, shown, with_todays_keys,
+    checked, complete, complete_table, default_of, default_value, find, lookup, numbers, pair, shown,
+    with_todays_keys,
 };
 pub use leaves::{Points, Text};
 pub(crate) use read::{read, read_known};
 pub(crate) use set::Place;
 pub use suggest::{expected, nearest};
+pub use write::written;

@@ -24,10 +24,13 @@ pub(crate) struct Driven {
     pub(crate) ended: Option<String>,
 }
 
-/// The input of tuning: the hidden rig's bounds and safe state, and of its rig the keys that are known.
+/// The input of tuning: the hidden rig's bounds and safe state, and of its rig encoder, converter and the keys that are known.
 pub(crate) fn known(hidden: &Scenario, rig: Table) -> Outcome<Scenario> {
     let mut table = hidden.table().clone();
     let mut own = Table::from_iter([("base".to_owned(), Value::String("paper".to_owned()))]);
+    let there = hidden.table().get("rig").and_then(Value::as_table);
+    let of = |key: &str| Some((key.to_owned(), there?.get(key)?.clone()));
+    own.extend(["encoder", "dac"].into_iter().filter_map(of));
     own.extend(rig);
     table.insert("rig".to_owned(), Value::Table(own));
     Ok(Scenario::from_table("rig", table, &[])?)
@@ -76,18 +79,19 @@ pub(crate) fn largest_ripple(hidden: &Scenario) -> Outcome<f64> {
     Ok((0..628_319).step_by(7).map(at).fold(0.0, f64::max))
 }
 
-/// Rigs that are done are kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
-/// anew begins anew.
+/// Rigs that are done are kept beside this program, under a name of its bytes and of what is other than usual: started anew it goes
+/// on, and a program that was built anew begins anew.
 pub(crate) struct Kept<C> {
     file: File,
     done: Vec<(u64, C)>,
 }
 
 impl<C: Clone + Serialize + DeserializeOwned> Kept<C> {
-    pub(crate) fn open() -> Outcome<Kept<C>> {
+    pub(crate) fn open(other: &str) -> Outcome<Kept<C>> {
         let program = std::env::current_exe()?;
         let mut bytes = DefaultHasher::new();
         bytes.write(&std::fs::read(&program)?);
+        bytes.write(other.as_bytes());
         let path = program.with_extension(format!("{:016x}.jsonl", bytes.finish()));
         let file = File::options().create(true).append(true).read(true).open(&path)?;
         // A line that was cut off is done again.
@@ -116,11 +120,4 @@ pub(crate) fn degrees(values: impl Iterator<Item = f64>) -> String {
     let values: Vec<f64> = values.map(f64::to_degrees).collect();
     let most = values.iter().copied().fold(0.0, f64::max);
     if values.is_empty() { "–".to_owned() } else { format!("{:.3}°, {most:.3}°", median(values)) }
-}
-
-/// Number of rigs and first seed, as the command line has them.
-pub(crate) fn rigs_and_seed() -> Outcome<(u64, u64)> {
-    let mut args = std::env::args().skip(1);
-    let mut number = |default: u64| args.next().map_or(Ok(default), |text| text.parse::<u64>());
-    Ok((number(50)?, number(30_001)?))
 }

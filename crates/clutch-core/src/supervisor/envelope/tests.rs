@@ -239,6 +239,34 @@ fn stays_inside<T: Real>(d: &Drawn) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
+    /// The envelope has the torques of the bounds in counts: the same at one voltage, and at several no less than at any of them.
+    #[test]
+    fn accelerations_are_those_of_the_torques_that_the_bounds_give(kind in 0..3_u8, volts in prop::array::uniform2(-6.0..6.0_f64)) {
+        let bounds = Bounds::around(&model(kind), &tolerances()).unwrap();
+        let envelope = limits_of(&bounds, &bare()).envelope;
+        let scale = 20_000.0 / core::f64::consts::TAU * PERIOD * PERIOD;
+        let rate = |torque: f64| {
+            torque * scale / if torque > 0.0 { bounds.inertia.low } else { bounds.inertia.high }
+        };
+        let drive = bounds.drive_torque;
+        let volts = if kind == 0 { volts.map(f64::abs) } else { volts };
+        let several = [volts[0].min(volts[1]), volts[0].max(volts[1])];
+        for [low, high] in [[volts[0]; 2], several] {
+            let [up, down] = envelope.rates([low, high], [0.0; 2]);
+            let [forwards, back] = [true, false].map(|forwards| bounds.possible(forwards, low, high));
+            for (has, torque) in [
+                (up.onward, drive.high + forwards.high),
+                (up.back, drive.high + back.high),
+                (down.onward, -(drive.low + back.low)),
+                (down.back, -(drive.low + forwards.low)),
+            ] {
+                let over = has - rate(torque);
+                prop_assert!(over > -1e-9, "{has} {}", rate(torque));
+                prop_assert!(low < high || over < 1e-9, "{has} {}", rate(torque));
+            }
+        }
+    }
+
     #[test]
     fn no_shaft_of_the_bounds_leaves_the_envelope(d in drawn()) {
         stays_inside::<f64>(&d)?;
