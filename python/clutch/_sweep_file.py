@@ -92,7 +92,7 @@ def sweep_to_file(
     Returns
     -------
     SweptFile
-        What is in the file.
+        The contents of the file.
 
     Raises
     ------

@@ -70,7 +70,7 @@ class Identified:
     Attributes
     ----------
     parameters : dict of str to Estimate
-        The findings: ``pull_rad_s2`` (T/J), ``delay_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
+        The findings: ``pull_rad_s2`` (T/J), ``delay_s`` (dead time and lag together), ``lag_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
         ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J). Of a motor axis, torques over its torque per volt:
         ``break_forwards_v``, ``break_backwards_v``, ``slide_forwards_v``, ``slide_backwards_v``, ``load_v``,
         ``viscous_v_s_rad`` (C/K), ``inertia_v_s2_rad`` (J/K), and velocity, delay and ripple as above.
@@ -215,7 +215,7 @@ def identify(
     Parameters
     ----------
     scenario : Scenario, str or path, default "board_smc_2"
-        A scenario with ``[safety]``. Its simulated board is run in virtual time, 54 s of it (70 s with a motor), unless
+        A scenario with ``[safety]``. Its simulated board is run in virtual time, 57 s of it (70 s with a motor), unless
         there are `logs`.
     logs : iterable of path, optional
         Logs to read instead: MCAP, or CSV with one sample a row.

@@ -10,8 +10,12 @@ use std::mem::MaybeUninit;
 use std::path::Path;
 use std::ptr::null;
 
-/// A built-in scenario in single precision, its settings as C has them, and its simulation.
+/// A scenario of a brake in single precision, its settings as C has them, and its simulation.
 pub(super) fn scenario(set: &[(&str, &str)]) -> (Vec<clutch_setting>, Trace) {
+    built_in("board_smc_2", set)
+}
+
+fn built_in(name: &str, set: &[(&str, &str)]) -> (Vec<clutch_setting>, Trace) {
     let mut set: Vec<(String, String)> =
         set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     set.push(("sampling.scalar".to_owned(), "f32".to_owned()));
@@ -21,7 +25,7 @@ pub(super) fn scenario(set: &[(&str, &str)]) -> (Vec<clutch_setting>, Trace) {
             [("run.duration_s", "0.2"), ("run.settle_s", "0")].map(|(k, v)| (k.to_owned(), v.to_owned())),
         );
     }
-    let scenario = Scenario::load(Path::new("board_smc_2"), &set).unwrap();
+    let scenario = Scenario::load(Path::new(name), &set).unwrap();
     let run = BuiltRun::new(&scenario, 0).unwrap();
     let settings = from_scenario::settings(&scenario, &run, Micros(0), run.ticks).unwrap();
     (list(&settings), simulate_watched::<f32>(&scenario.spec(), Keep::Trace, UNWATCHED).unwrap().trace)
@@ -85,6 +89,7 @@ pub(super) fn state(axis: &mut MaybeUninit<clutch_axis>) -> (u8, u8, u16) {
 
 const RUNNING: u8 = 3;
 const HOLDING: u8 = 4;
+const RELEASED: u8 = 5;
 const FAULTED: u8 = 6;
 const DONE: u8 = 15;
 
@@ -110,6 +115,26 @@ fn an_axis_answers_as_the_simulation_did_and_ends_in_its_safe_state() {
     assert_eq!(state(&mut axis), (HOLDING, DONE, held));
     let after = sample(&mut axis, last as u32 + 1, trace.counts[last]);
     assert_eq!((after.answered, after.state, after.code), (0, HOLDING, held));
+}
+
+/// To and fro, with voltages of both signs; its safe state is 0 V, the middle code.
+#[test]
+fn a_motor_axis_answers_as_the_simulation_did_and_is_released() {
+    let (settings, trace) = built_in("motor_pid", &[]);
+    let released = 2048;
+    let mut axis = MaybeUninit::uninit();
+    assert_eq!(build(&mut axis, &settings).0, clutch_result::CLUTCH_OK);
+    // SAFETY: it has been built.
+    assert_eq!(unsafe { clutch_axis_consent(axis.as_mut_ptr(), released) }, clutch_result::CLUTCH_OK);
+    for (tick, counts) in trace.counts.iter().enumerate() {
+        let cycle = sample(&mut axis, tick as u32, *counts);
+        assert_eq!((cycle.state, cycle.answered, cycle.code), (RUNNING, 1, trace.code[tick]), "tick {tick}");
+    }
+    if !cfg!(miri) {
+        let (least, most) = (trace.code.iter().min().unwrap(), trace.code.iter().max().unwrap());
+        assert!(*least < released && *most > released, "{least} to {most}");
+    }
+    assert_eq!(state(&mut axis), (RELEASED, DONE, released));
 }
 
 #[test]

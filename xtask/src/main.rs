@@ -190,8 +190,9 @@ enum Verb {
     /// docs/loop.md.
     Drift,
     /// Identifies random rigs and as many random motor axes, each from about a minute of experiment on the simulated board; as
-    /// many of both with ripples of other waves, a tenth as many with each of some encoders and periods, and a quarter as many
-    /// rigs of each kind that is unlike the model: the tables of docs/identify.md, half an hour.
+    /// many of both with ripples of other waves, a tenth as many with each of some encoders and periods, half as many with a lag of
+    /// their actuators, and a quarter as many rigs of each kind that is unlike the model: the tables of docs/identify.md, half an
+    /// hour.
     Identify {
         /// Rigs.
         #[arg(default_value_t = 200)]
@@ -304,37 +305,8 @@ fn main() -> Result<()> {
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
         Verb::Drift => drift(),
-        Verb::Identify { rigs, seed } => {
-            let page = "docs/identify.md";
-            let of = |example| ["clutch-identify", example];
-            for (example, name, first) in
-                [("identified_rigs", "campaign", seed), ("identified_motors", "motors", seed + MOTORS)]
-            {
-                random_rigs(of(example), page, name, (rigs, first), &[])?;
-                random_rigs(of(example), page, &format!("{name}_waves"), (rigs, first + WAVES), &["waves"])?;
-                other_loops(
-                    of(example),
-                    page,
-                    &format!("{name}_loops"),
-                    (rigs.div_ceil(10), first + LOOPS),
-                    &[],
-                )?;
-            }
-            random_rigs(of("unlike_rigs"), page, "unlike", (rigs.div_ceil(4), seed + UNLIKE), &[])
-        }
-        Verb::Tune { rigs, seed } => {
-            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", (rigs, seed), &[])?;
-            let (few, of) = (rigs.div_ceil(5), ["clutch-tune", "tuned_rigs"]);
-            other_loops(of, "docs/tune.md", "campaign_loops", (few, seed + LOOPS), &["waves"])?;
-            // A reversal takes most of a minute to tune for.
-            random_rigs(
-                ["clutch-tune", "tuned_motors"],
-                "docs/tune.md",
-                "motors",
-                ((2 * rigs).div_ceil(5), seed),
-                &[],
-            )
-        }
+        Verb::Identify { rigs, seed } => identify(rigs, seed),
+        Verb::Tune { rigs, seed } => tune(rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
@@ -490,6 +462,28 @@ fn meter() -> Result<()> {
     Ok(())
 }
 
+fn identify(rigs: u64, seed: u64) -> Result<()> {
+    let page = "docs/identify.md";
+    let of = |example| ["clutch-identify", example];
+    let braked = "identified_rigs";
+    for (example, name, first) in [(braked, "campaign", seed), ("identified_motors", "motors", seed + MOTORS)]
+    {
+        random_rigs(of(example), page, name, (rigs, first), &[])?;
+        random_rigs(of(example), page, &format!("{name}_waves"), (rigs, first + WAVES), &["waves"])?;
+        other_loops(of(example), page, &format!("{name}_loops"), (rigs.div_ceil(10), first + LOOPS), &[])?;
+    }
+    random_rigs(of(braked), page, "campaign_lags", (rigs.div_ceil(2), seed + LAGS), &["lags"])?;
+    random_rigs(of("unlike_rigs"), page, "unlike", (rigs.div_ceil(4), seed + UNLIKE), &[])
+}
+
+fn tune(rigs: u64, seed: u64) -> Result<()> {
+    let (page, of) = ("docs/tune.md", |example| ["clutch-tune", example]);
+    random_rigs(of("tuned_rigs"), page, "campaign", (rigs, seed), &[])?;
+    other_loops(of("tuned_rigs"), page, "campaign_loops", (rigs.div_ceil(5), seed + LOOPS), &["waves"])?;
+    // A reversal takes most of a minute to tune for.
+    random_rigs(of("tuned_motors"), page, "motors", ((2 * rigs).div_ceil(5), seed), &[])
+}
+
 /// From the seeds of braked rigs to those of motor axes.
 const MOTORS: u64 = 20_000;
 /// And to those of rigs that are unlike the model.
@@ -498,6 +492,8 @@ const UNLIKE: u64 = 40_000;
 const WAVES: u64 = 80_000;
 /// See [`WAVES`].
 const LOOPS: u64 = 90_000;
+/// From the seeds of braked rigs to those of actuators with a lag.
+const LAGS: u64 = 130_000;
 /// Encoders and periods other than 20 000 counts and 1 ms.
 const OTHER_LOOPS: [&str; 8] = [
     "rig.encoder.counts_per_rev=4096",

@@ -30,6 +30,7 @@ pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_metrics.py", "cargo xtask generate"),
     ("python/clutch/_tables.py", "cargo xtask generate"),
     ("docs/scenario.schema.json", "cargo xtask generate"),
+    ("firmware/nucleo-g474re/src/alone_run.rs", "clutch scenario rust"),
     ("crates/clutch-wire/include/clutch_wire.h", "cargo xtask generate"),
     ("crates/clutch-c/include/clutch.h", "cargo xtask generate"),
     ("tests/wire/vectors.csv", "cargo xtask generate"),

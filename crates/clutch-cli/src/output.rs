@@ -364,7 +364,7 @@ pub(crate) struct Forms {
     /// Draws the result.
     #[arg(long, value_parser = to_write(), value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
-    /// Writes the result as a page, with the picture and every setting.
+    /// Writes the result as a page, with the picture and every parameter.
     #[arg(long, value_parser = to_write(), value_name = "FILE.html")]
     html: Option<PathBuf>,
 }

@@ -101,7 +101,7 @@ impl Page<'_> {
         ];
         let after = [
             part(!self.about.is_empty(), "about", "About"),
-            part(!self.settings.is_empty(), "settings", "Settings"),
+            part(!self.settings.is_empty(), "settings", "Parameters"),
         ];
         before.into_iter().chain(tables).chain(after).flatten().collect()
     }

@@ -901,7 +901,7 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
             .concat(),
     );
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
-    assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not determined; "), "{}", out(&o));
+    assert!(out(&o).contains("T/J  ") && out(&o).contains("  lag  "), "{}", out(&o));
     assert!(out(&o).ends_with(&format!("\nwrote {rig}\n")), "{}", out(&o));
     assert!(narrow(&err(&o)), "{}", err(&o));
     // All that is printed fits a terminal.

@@ -4,7 +4,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`law`] | PD (4), CTC (11), SMC (29) and (31): parameters → law → state |
+//! | [`law`] | the list of laws, the paper's and others: parameters → law → state |
 //! | [`Servo`] | encoder counts and target in, DAC code and terms out |
 //! | [`Stribeck`], [`Actuator`], [`Plant`] | friction (2), brake or motor, and the shaft (1) |
 //! | [`SmoothedDerivative`], `CountsOverTime`, [`edge_timed`], `Observer` | where the velocity comes from |
@@ -17,7 +17,7 @@
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
 //! every target for one scalar type. Features: `linalg` (velocity sources that
 //! no board has: the observer, on nalgebra, the edge-timed filter for any law, and counts over time), `vsqrt` (on Arm with a unit for floats, the
-//! square root by its one instruction, the only `unsafe` of the crate), `defmt`.
+//! square root by its one instruction, the only `unsafe` of the crate), `defmt`, `terse` (errors without their words).
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
 #![cfg_attr(not(feature = "vsqrt"), forbid(unsafe_code))]

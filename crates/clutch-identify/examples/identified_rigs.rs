@@ -23,6 +23,7 @@ use rows::As;
 const ROWS: &[Row<Truth, Report>] = &[
     ("T/J", As::Percent, |r| &r.pull, |t| t.pull),
     ("delay", As::Times(1e3, "ms"), |r| &r.delay, |t| t.delay),
+    ("lag", As::Times(1e3, "ms"), |r| &r.lag, |t| t.lag),
     ("v_hold = T/(μ_d K)", As::Percent, |r| &r.hold, |t| t.hold),
     ("ripple, rms", As::Times(1.0, ""), |r| &r.ripple, |t| t.ripple),
     ("μ_s/μ_d", As::Percent, |r| &r.ratio, |t| t.ratio),

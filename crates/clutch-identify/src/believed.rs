@@ -118,9 +118,12 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
             set.push((key, Value::Float(velocity)));
         }
     }
+    // A lag that may be none is believed to be none.
+    let lag = file.and_then(|file| file.lag).map(|lag| if lag.low > 0.0 { lag.value } else { 0.0 });
     if let Some(delay) = file.and_then(|file| file.delay) {
+        let delay = delay.less(lag.unwrap_or(0.0));
         let ticks = (delay.value / period).round();
-        if !(delay.low..=delay.high).contains(&(ticks * period)) {
+        if !delay.holds(ticks * period) {
             delay_between = Some(format!(
                 "the delay found, {:.2} … {:.2} ms, holds no whole number of periods",
                 1e3 * delay.low,
@@ -135,6 +138,15 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
         if let Some(value) = model.get(key) {
             rig.insert(key.to_owned(), value.clone());
         }
+    }
+    match lag {
+        Some(lag) if lag > 0.0 => {
+            rig.insert("actuator_time_constant_s".to_owned(), Value::Float(lag));
+        }
+        Some(_) => {
+            rig.remove("actuator_time_constant_s");
+        }
+        None => {}
     }
     let torque = spec.model.drive_torque;
     let drive = if kind == ActuatorKind::Brake { weight(&spec.rig.drive, torque) } else { load(torque) };

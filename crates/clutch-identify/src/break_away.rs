@@ -105,6 +105,12 @@ pub fn break_aways(recording: &Recording) -> Vec<BreakAway<'_>> {
     found
 }
 
+/// Mean voltage at which a shaft breaks away, V; none without a break-away.
+pub(crate) fn mean_volts(slips: &[BreakAway<'_>]) -> Option<f64> {
+    let volts = |slip: &BreakAway<'_>| slip.recording.ticks[slip.ticks.0 - 1].volts;
+    (!slips.is_empty()).then(|| slips.iter().map(volts).sum::<f64>() / slips.len() as f64)
+}
+
 /// Logarithm of a mean of exponentials.
 fn log_mean(logs: impl Iterator<Item = f64> + Clone) -> f64 {
     let (n, most) = logs.clone().fold((0_u32, f64::NEG_INFINITY), |(n, most), x| (n + 1, most.max(x)));

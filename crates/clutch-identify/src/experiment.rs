@@ -5,8 +5,10 @@
 //! | `releases` | PID without an integral on a path of steps | the brake lets go for some 40 ms: free falls |
 //! | `crawl` | a soft PD far below the rate at which it sticks | break-aways under a voltage that falls slowly |
 //! | `ride …` | glide, with the findings of the releases | mean friction at a rate, ripple |
+//! | `releases_low`, behind the first ride | SMC with the sign function on such a path: releases from a lower voltage | a lag of the actuator, apart from a dead time |
 //! | `releases_behind` | as `releases` | whether the torque is what it was |
 
+use crate::break_away::{self, break_aways};
 use crate::recording::{ReadError, Recording};
 use crate::release;
 use clutch_core::edge_timed::{EdgeTimedParams, waves_seen};
@@ -31,13 +33,15 @@ use toml::{Table, Value};
 pub struct Programme {
     /// Releases.
     pub releases: u32,
+    /// Releases from a lower voltage.
+    pub releases_low: u32,
     /// Releases behind the rides.
     pub releases_behind: u32,
-    /// Way from one release to the next, °.
-    pub step_deg: f64,
+    /// Way from one release to the next, and from a lower voltage, from which a shaft takes longer to stop, °.
+    pub step_deg: [f64; 2],
     /// Length of the crawl, s.
     pub crawl_s: f64,
-    /// Rates of the rides, °/s, and their lengths, s.
+    /// Rates of the rides, °/s, and their lengths, s, in their order: the first at a rate that bears a lag nobody knows of.
     pub rides: Vec<(f64, f64)>,
 }
 
@@ -46,10 +50,11 @@ impl Default for Programme {
     fn default() -> Self {
         Programme {
             releases: 12,
+            releases_low: 6,
             releases_behind: 4,
-            step_deg: 2.5,
+            step_deg: [2.5, 1.5],
             crawl_s: 24.0,
-            rides: vec![(5.0, 10.0), (20.0, 7.0), (60.0, 5.0)],
+            rides: vec![(20.0, 7.0), (5.0, 10.0), (60.0, 5.0)],
         }
     }
 }
@@ -62,6 +67,12 @@ const CRAWL_KP: f64 = 115.0; // V/rad
 const CRAWL_KD: f64 = 3.0; // V s/rad
 /// Following error at rest that ends a part, °: a release and a soft law are far from the path.
 const FOLLOWING_DEG: f64 = 6.0;
+/// The lower voltage of releases, over the mean of a ride: it stops a shaft that has fallen a step within two of them; and the share
+/// of the highest that it is at most, for a lag shows in the ratio of the two.
+const LOW: f64 = 1.6;
+const LOWER: f64 = 0.8;
+/// Slope of a surface on which a velocity counts for less than an encoder's step, 1/s.
+const PLACE_ALONE: f64 = 1e4;
 /// Share of the speed limit with which a step of the path rises.
 const STEP_RATE: f64 = 0.8;
 
@@ -79,25 +90,33 @@ impl Programme {
         if !(least..=most).contains(&value) {
             return Err(ExperimentError::Limit { key: "fastest", value, least, most, unit: "°/s" });
         }
-        let mut programme = Programme::default();
-        programme.rides.iter_mut().for_each(|ride| ride.0 = ride.0.min(value));
-        programme.rides.dedup_by(|faster, ride| faster.0 <= ride.0);
-        Ok(programme)
+        let programme = Programme::default();
+        let mut rides: Vec<(f64, f64)> = Vec::new();
+        for (rate, seconds) in programme.rides {
+            let rate = rate.min(value);
+            match rides.iter_mut().find(|ride| ride.0.total_cmp(&rate).is_eq()) {
+                Some(same) => same.1 = same.1.max(seconds),
+                None => rides.push((rate, seconds)),
+            }
+        }
+        Ok(Programme { rides, ..programme })
     }
 
     /// Its length, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        let releases = releases_s(self.releases) + releases_s(self.releases_behind);
-        releases + self.crawl_s + self.rides.iter().map(|ride| ride.1).sum::<f64>()
+        let releases = [self.releases, self.releases_low, self.releases_behind].map(releases_s);
+        releases.iter().sum::<f64>() + self.crawl_s + self.rides.iter().map(|ride| ride.1).sum::<f64>()
     }
 
     /// The way that the shaft is turned by, °, beyond which only a fault goes.
     #[must_use]
     pub fn way_deg(&self) -> f64 {
         let rides: f64 = self.rides.iter().map(|(rate, seconds)| rate * seconds).sum();
-        let parts = 3.0 + self.rides.len() as f64;
-        f64::from(self.releases + self.releases_behind) * self.step_deg
+        let parts = 4.0 + self.rides.len() as f64;
+        let [step, low] = self.step_deg;
+        f64::from(self.releases + self.releases_behind) * step
+            + f64::from(self.releases_low) * low
             + CRAWL_DEG_S * self.crawl_s
             + rides
             + parts * FOLLOWING_DEG
@@ -106,22 +125,28 @@ impl Programme {
     /// The plan, a line for each part: what it does, for how long, and how far.
     #[must_use]
     pub fn plan(&self) -> Vec<String> {
+        let [step, low] = self.step_deg;
         let releases = |number: u32| {
+            let seconds = releases_s(number);
             format!(
-                "releases    {number} times 0 V until the shaft has fallen by about {} °, {:.1} s",
-                self.step_deg,
-                releases_s(number)
+                "releases    {number} times 0 V until the shaft has fallen by about {step} °, {seconds:.1} s"
             )
         };
+        let mut rides = self
+            .rides
+            .iter()
+            .map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s"));
         let mut lines = vec![
             releases(self.releases),
             format!("crawl       {CRAWL_DEG_S} °/s under a soft PD, it sticks and slips, {} s", self.crawl_s),
         ];
-        lines.extend(
-            self.rides
-                .iter()
-                .map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
-        );
+        lines.extend(rides.next());
+        lines.push(format!(
+            "releases    {} times from a lower voltage, by about {low} °, {:.1} s",
+            self.releases_low,
+            releases_s(self.releases_low)
+        ));
+        lines.extend(rides);
         lines.push(releases(self.releases_behind));
         lines.push(format!(
             "limits      {:.0}° in all; a part ends {FOLLOWING_DEG}° off its path, and by any other check",
@@ -266,16 +291,27 @@ pub fn experiment(
         return Err(ExperimentError::NoRelease(lowest));
     }
     let mut recordings = run("releases", &releases(base, programme.releases, programme)?)?;
-    let found: Vec<_> = recordings.iter().flat_map(release::releases).collect();
-    let fall = release::fall(&found, crate::DAMPINGS).ok();
     recordings.extend(run("crawl", &crawl(base, programme)?)?);
-    for ride in &programme.rides {
-        let name = format!("ride_{}", ride.0);
-        recordings.extend(run(&name, &glide(base, *ride, fall.as_ref())?)?);
+    let mut fall = fall(&recordings);
+    for (number, ride) in programme.rides.iter().enumerate() {
+        let ridden = run(&format!("ride_{}", ride.0), &glide(base, *ride, fall.as_ref())?)?;
+        let low = LOW * mean_volts(&ridden);
+        recordings.extend(ridden);
+        if number == 0 && low < LOWER * base.params().output.highest {
+            recordings.extend(run("releases_low", &releases_from(base, low, programme)?)?);
+            fall = self::fall(&recordings).or(fall);
+        }
     }
     let behind = releases(base, programme.releases_behind, programme)?;
     recordings.extend(run("releases_behind", &behind)?);
     Ok(recordings)
+}
+
+/// T/J, delay and lag as known from these, where they are.
+fn fall(recordings: &[Recording]) -> Option<release::Fall> {
+    let releases: Vec<_> = recordings.iter().flat_map(release::releases).collect();
+    let slips: Vec<_> = recordings.iter().flat_map(break_aways).collect();
+    release::fall(&releases, crate::DAMPINGS, break_away::mean_volts(&slips)).ok()
 }
 
 /// A table of one key after the other.
@@ -310,6 +346,13 @@ pub(crate) fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scena
     Scenario::from_table(&format!("{name} for {}", base.name()), table, &[("name".to_owned(), title)])
 }
 
+/// Mean voltage of a ride, V.
+fn mean_volts(ride: &[Recording]) -> f64 {
+    let ticks = || ride.iter().flat_map(|r| &r.ticks);
+    ticks().map(|tick| tick.volts).sum::<f64>() / ticks().count() as f64
+}
+
+/// Releases on a path of steps; the brake holds with all that the output has.
 fn releases(base: &Scenario, number: u32, programme: &Programme) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
     let rate = STEP_RATE * spec.rig.speed.speed_limit; // rad/s
@@ -328,21 +371,42 @@ fn releases(base: &Scenario, number: u32, programme: &Programme) -> Result<Scena
             ("bias_v", Value::Float(wait)),
         ]),
     )]);
-    let rise = programme.step_deg / rate.to_degrees();
+    let path = steps(base, number, programme.step_deg[0]);
+    checked(base, "releases", part(base, law, path, releases_s(number))?)
+}
+
+/// The same, held with a voltage lower than that: one voltage ahead of the path, none behind it.
+fn releases_from(base: &Scenario, volts: f64, programme: &Programme) -> Result<Scenario, ScenarioError> {
+    let number = programme.releases_low;
+    let law = table([(
+        "smc_sign",
+        table([
+            ("kp_v", Value::Float(volts)),
+            ("kd_v_s_rad", Value::Float(0.0)),
+            ("slope_1_s", Value::Float(PLACE_ALONE)),
+        ]),
+    )]);
+    let path = steps(base, number, programme.step_deg[1]);
+    checked(base, "releases from a lower voltage", part(base, law, path, releases_s(number))?)
+}
+
+/// A path of so many steps, °.
+fn steps(base: &Scenario, number: u32, step_deg: f64) -> Value {
+    let rate = STEP_RATE * base.spec().rig.speed.speed_limit; // rad/s
+    let rise = step_deg / rate.to_degrees();
     let mut points = vec![(0.0, 0.0)];
     for k in 0..number {
-        let (time, angle) = (PACE_S * f64::from(k + 1), programme.step_deg * f64::from(k));
-        points.extend([(time, angle), (time + rise, angle + programme.step_deg)]);
+        let (time, angle) = (PACE_S * f64::from(k + 1), step_deg * f64::from(k));
+        points.extend([(time, angle), (time + rise, angle + step_deg)]);
     }
     let points = points.into_iter().map(|(t, a)| Value::Array(vec![Value::Float(t), Value::Float(a)]));
-    let path = table([(
+    table([(
         "table",
         table([
             ("points_s_deg", Value::Array(points.collect())),
             ("interpolation", Value::String("linear".to_owned())),
         ]),
-    )]);
-    checked(base, "releases", part(base, law, path, releases_s(number))?)
+    )])
 }
 
 pub(crate) fn ramp(rate_deg_s: f64) -> Value {
@@ -363,10 +427,13 @@ fn glide(
     fall: Option<&release::Fall>,
 ) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
-    let delay = fall.map_or(0.0, |fall| (fall.delay.value / spec.period.seconds::<f64>()).round().min(3.0));
+    let period: f64 = spec.period.seconds();
+    let delay = fall.map_or(0.0, |fall| (fall.dead_time() / period).round().min(3.0));
+    let lag = fall.map_or(0.0, release::Fall::lags);
     let waves = waves_seen(EdgeTimedParams::<f64>::default().waves, spec.rig.encoder.sensor.counts_per_rev);
     let filter = table([
         ("delay_ticks", Value::Integer(delay as i64)),
+        ("lag_s", Value::Float(lag)),
         ("ripple_waves_per_turn", Value::Float(waves)),
     ]);
     let law = table([("glide", table([("filter", filter)]))]);

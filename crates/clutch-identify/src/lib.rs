@@ -8,6 +8,7 @@ mod confidence;
 pub mod experiment;
 pub mod filter;
 pub mod identified;
+mod lag;
 pub mod map_file;
 pub mod motor;
 mod profile;
@@ -45,6 +46,13 @@ impl Estimate {
     #[must_use]
     pub fn times(self, by: f64) -> Estimate {
         Estimate { value: self.value * by, low: self.low * by, high: self.high * by }
+    }
+
+    /// The same without a part that is known; nothing below 0.
+    #[must_use]
+    pub fn less(self, by: f64) -> Estimate {
+        let left = |x: f64| (x - by).max(0.0);
+        Estimate { value: left(self.value), low: left(self.low), high: left(self.high) }
     }
 
     /// `true` if a value lies within.

@@ -1,6 +1,6 @@
 //! Friction along the disc, from a ride to `[friction_map]` of a scenario.
 
-use crate::recording::Recording;
+use crate::recording::{Recording, at_pad};
 use crate::ride::{Place, rides, waves};
 use clutch_sim::Scenario;
 
@@ -10,13 +10,14 @@ use clutch_sim::Scenario;
 pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Place> {
     let spec = scenario.spec();
     let period: f64 = spec.period.seconds();
-    // A lag is, for a voltage that follows the ripple, a delay.
-    let delay = match spec.law.filter() {
-        Some(filter) => f64::from(filter.delay) * period + filter.lag,
-        None => f64::from(spec.rig.delay_ticks) * period + spec.rig.actuator_time_constant.unwrap_or(0.0),
+    let (ticks, lag) = match spec.law.filter() {
+        Some(filter) => (filter.delay, filter.lag),
+        None => (spec.rig.delay_ticks, spec.rig.actuator_time_constant.unwrap_or(0.0)),
     };
+    let delay = f64::from(ticks) * period;
     let pull = (spec.model.drive_torque / spec.model.inertia).abs();
-    let slowest = recordings.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));
+    let seen = at_pad(recordings, lag);
+    let slowest = seen.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));
     slowest.map_or_else(Vec::new, |ride| ride.told(pull, delay, waves(&[&ride], pull, delay), None).map)
 }
 

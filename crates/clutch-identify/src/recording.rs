@@ -6,6 +6,7 @@ use clutch_core::{ActuatorKind, Dac, DacCode};
 use clutch_log::{CommandRecord, CommandSource, Log, SampleRecord};
 use clutch_loop::to_log::{PRESENT_CODE, START_VOLTAGE};
 use clutch_sim::{Scenario, ScenarioError};
+use std::borrow::Cow;
 
 /// A sample, and the voltage that was given after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -111,6 +112,15 @@ pub enum ReadError {
     },
 }
 
+/// Recordings as seen behind an actuator with a lag, s, if there is one.
+pub(crate) fn at_pad(recordings: &[Recording], lag: f64) -> Cow<'_, [Recording]> {
+    if lag > 0.0 {
+        Cow::Owned(recordings.iter().map(|r| r.through_lag(lag)).collect())
+    } else {
+        Cow::Borrowed(recordings)
+    }
+}
+
 /// Most of a table that is read whole, MiB: some hours of a kilohertz.
 pub const MOST_TABLE_MIB: u64 = 256;
 
@@ -158,6 +168,20 @@ impl Recording {
             return newer;
         }
         ((change - from) * older + (to - change) * newer) / (to - from)
+    }
+
+    /// As seen behind an actuator with a lag, s: of each period the mean of the voltage that it has.
+    #[must_use]
+    pub fn through_lag(&self, lag: f64) -> Recording {
+        let mut seen = self.clone();
+        let left = libm::exp(-self.period / lag);
+        let mut at_pad = self.volts_before;
+        for tick in &mut seen.ticks {
+            let end = tick.volts + (at_pad - tick.volts) * left;
+            let mean = tick.volts + (at_pad - tick.volts) * (1.0 - left) * lag / self.period;
+            (tick.volts, at_pad) = (mean, end);
+        }
+        seen
     }
 
     /// The recordings in a log: more than one where samples are missing. A weight that drives backwards is turned round.

@@ -8,9 +8,12 @@
 //! (n_j − n_i − 1)/(f_j − f_i) < (T/J)/q < (n_j − n_i + 1)/(f_j − f_i)        f_j > f_i
 //! ```
 //!
+//! An actuator with a lag lets go gradually, each release with a delay of its own: [`crate::lag`].
+//!
 //! Nothing here is a matter of chance: a value outside the set contradicts a count.
 
 use crate::Estimate;
+use crate::lag::{self, LagLine, Late};
 use crate::recording::Recording;
 
 /// Shortest release that shows something, periods.
@@ -37,6 +40,8 @@ const LOOSER: f64 = 0.5;
 pub struct Release {
     /// Its recording, and the first tick with 0 V.
     pub place: (String, u64),
+    /// Voltage before it, V.
+    before: f64,
     /// Counts from that tick on, while nothing brakes.
     counts: Vec<f64>,
     /// Sampling period, s; a count, rad.
@@ -48,11 +53,27 @@ pub struct Release {
 pub struct Fall {
     /// T/J, rad/s².
     pub pull: Estimate,
-    /// Delay from a sample's voltage to its effect, s.
+    /// Delay from a sample's voltage to its effect, s; of an actuator with a lag that of a voltage that changes slowly.
     pub delay: Estimate,
+    /// Lag of the actuator, s; `None` if releases came from one voltage, or a delay for each explains nothing.
+    pub lag: Option<Estimate>,
     /// `None` if one delay explains all releases to the last count; else what it took: a delay for each release, and
     /// counts by which edges were off.
     pub looser: Option<f64>,
+}
+
+impl Fall {
+    /// Lag, s, where there is one: 0 of an interval that begins there.
+    #[must_use]
+    pub fn lags(&self) -> f64 {
+        self.lag.filter(|lag| lag.low > 0.0).map_or(0.0, |lag| lag.value)
+    }
+
+    /// Delay without that lag, s.
+    #[must_use]
+    pub fn dead_time(&self) -> f64 {
+        self.delay.less(self.lags()).value
+    }
 }
 
 /// No fall explains all counts.
@@ -98,6 +119,7 @@ pub fn releases(recording: &Recording) -> Vec<Release> {
             let first = ticks[i].counts;
             found.push(Release {
                 place: (recording.name.clone(), recording.first_tick + i as u64),
+                before: ticks[i - 1].volts,
                 counts: ticks[i..=end.min(i + LONGEST)].iter().map(|t| (t.counts - first) as f64).collect(),
                 units: (recording.period, recording.radians_per_count()),
             });
@@ -124,18 +146,37 @@ fn flight(time: f64, damping: f64) -> f64 {
     (x + libm::expm1(-x)) / (damping * damping)
 }
 
+/// A fall but for T/J and delay: C/J, 1/s; the actuator's lag, s; counts by which edges may be off.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    damping: f64,
+    lag: f64,
+    slack: f64,
+}
+
+impl Shape {
+    /// Fall from rest in a time at unit acceleration, under what the brake has left behind the break-away.
+    fn fall(&self, time: f64) -> f64 {
+        let left = if self.lag > 0.0 { lag::left_of_fall(time, self.lag) } else { 0.0 };
+        flight(time, self.damping) - left
+    }
+}
+
+/// Counts of a fall that says something of a delay.
+const FEWEST_COUNTS: f64 = 20.0;
+
 impl Release {
+    /// `true` if the shaft falls so far that its delay shows.
+    fn falls(&self) -> bool {
+        self.counts.last().is_some_and(|way| *way >= FEWEST_COUNTS)
+    }
+
     /// Narrows bounds of T/J (rad/s²); the index of the sample at which nothing was left.
-    fn narrow(
-        &self,
-        delay: f64,
-        damping: f64,
-        slack: f64,
-        (low, high): &mut (f64, f64),
-    ) -> Result<(), usize> {
+    fn narrow(&self, delay: f64, shape: Shape, (low, high): &mut (f64, f64)) -> Result<(), usize> {
         let (period, count) = self.units;
         let falls: Vec<f64> =
-            (0..self.counts.len()).map(|i| flight((i as f64 * period - delay).max(0.0), damping)).collect();
+            (0..self.counts.len()).map(|i| shape.fall((i as f64 * period - delay).max(0.0))).collect();
+        let slack = shape.slack;
         for j in 1..falls.len() {
             // The first edge says most together with the last: pairs within a count say nothing.
             for i in 0..j {
@@ -159,22 +200,43 @@ impl Release {
 
 /// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s. If there is none
 /// with one delay, each release has its own, as with a lag of the actuator; if there is none with sharp edges, they may be
-/// off by more. A T/J of its own for each release is a torque that varies, and no T/J at all.
+/// off by more. A T/J of its own for each release is a torque that varies, and no T/J at all. `breaks_away`: mean voltage at which
+/// the shaft breaks away, V, if it is known.
 ///
 /// # Errors
 /// The tick that nothing explains, of the values that explain most, and whether the releases differ.
-pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplained> {
-    let mut at = match with_one_delay(releases, dampings) {
-        Ok(fall) => return Ok(fall),
-        Err(at) => at,
-    };
+pub fn fall(
+    releases: &[Release],
+    dampings: (f64, f64),
+    breaks_away: Option<f64>,
+) -> Result<Fall, Unexplained> {
     let period = releases.first().map_or(1e-3, |r| r.units.0);
     let [sharp, looser] = [SLACK, LOOSER].map(|slack| slack * coarser(releases));
+    let mut at = match with_one_delay(releases, dampings) {
+        Ok(fall) => {
+            let line = LagLine::through(&late(releases, &fall.pull, dampings, (sharp, 0.0)), 0.0, period);
+            return Ok(lagging(releases, fall, line.as_ref(), breaks_away));
+        }
+        Err(at) => at,
+    };
     for (slack, own) in [(sharp, false), (looser, true)] {
-        at.apart = match with_own_delays(releases, dampings, slack) {
-            Some(late) if late.delay.high - late.delay.low <= MOST_APART * period => return Ok(late),
-            Some(late) => Some(Apart::Delays(late.delay.low, late.delay.high)),
-            None => with_own_pulls(releases, dampings, slack, own),
+        at.apart = match with_a_lag(releases, dampings, slack) {
+            Some((fall, line)) if !line.strays(0.5 * MOST_APART * period) => {
+                return Ok(lagging(releases, fall, Some(&line), breaks_away));
+            }
+            Some((fall, _)) => Some(Apart::Delays(fall.delay.low, fall.delay.high)),
+            None => match with_own_delays(releases, dampings, (slack, 0.0)) {
+                Some(fall) if fall.delay.high - fall.delay.low <= MOST_APART * period => {
+                    let late = late(releases, &fall.pull, dampings, (slack, 0.0));
+                    let line = LagLine::through(&late, 0.0, period);
+                    let most = releases.iter().map(|release| release.before).fold(0.0, f64::max);
+                    let delay =
+                        breaks_away.map_or(fall.delay, |volts| lag::unseparated(fall.delay, most / volts));
+                    return Ok(Fall { delay, lag: line.map(|line| line.lag), ..fall });
+                }
+                Some(late) => Some(Apart::Delays(late.delay.low, late.delay.high)),
+                None => with_own_pulls(releases, dampings, slack, own),
+            },
         };
         if at.apart.is_some() {
             return Err(at);
@@ -184,10 +246,10 @@ pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplai
     let (alone, rest): (Vec<Release>, Vec<Release>) = releases
         .iter()
         .cloned()
-        .partition(|r| with_own_delays(std::slice::from_ref(r), dampings, looser).is_none());
+        .partition(|r| with_own_delays(std::slice::from_ref(r), dampings, (looser, 0.0)).is_none());
     at.apart = match alone.len() {
         0 => None,
-        1 => with_own_delays(&rest, dampings, looser)
+        1 => with_own_delays(&rest, dampings, (looser, 0.0))
             .is_none()
             .then(|| with_own_pulls(&rest, dampings, looser, true))
             .flatten(),
@@ -201,7 +263,7 @@ pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplai
 fn with_own_pulls(releases: &[Release], dampings: (f64, f64), slack: f64, own_delays: bool) -> Option<Apart> {
     let bounds = |release: &Release, delay: f64, damping: f64| {
         let mut own = (0.0, f64::INFINITY);
-        release.narrow(delay, damping, slack, &mut own).ok().map(|()| own)
+        release.narrow(delay, Shape { damping, lag: 0.0, slack }, &mut own).ok().map(|()| own)
     };
     let apart = |of: &dyn Fn(&Release) -> Option<(f64, f64)>| {
         releases.iter().try_fold((0.0_f64, f64::INFINITY), |ends, release| {
@@ -233,7 +295,59 @@ fn delays(releases: &[Release]) -> impl Iterator<Item = f64> + Clone {
     (0..=(LONGEST_DELAY / DELAY_STEP) as usize).map(move |k| k as f64 * step)
 }
 
-fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Option<Fall> {
+/// The same with the lag that delays show, and the delay of a voltage that changes slowly.
+fn lagging(releases: &[Release], fall: Fall, line: Option<&LagLine>, breaks_away: Option<f64>) -> Fall {
+    let delay = line.zip(breaks_away).map(|(line, volts)| {
+        if line.lag.low <= 0.0 {
+            return line.without(fall.delay, volts);
+        }
+        // With another T/J all are earlier, or later, together: by half as much of a fall, and mostly by half of that.
+        let seconds = |r: &Release| r.counts.len() as f64 * r.units.0 / releases.len() as f64;
+        let length: f64 = releases.iter().map(seconds).sum();
+        line.delay(volts, 0.25 * length * fall.pull.share())
+    });
+    Fall { delay: delay.unwrap_or(fall.delay), lag: line.map(|line| line.lag), ..fall }
+}
+
+/// Lags that are tried at first, and times that a lag is found from the delays of falls with the one before, periods.
+const LAGS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+const PASSES: usize = 4;
+
+/// What explains all releases with one T/J and the delays that a lag gives them; none where their voltages do not tell of a lag,
+/// or nothing explains them.
+fn with_a_lag(releases: &[Release], dampings: (f64, f64), slack: f64) -> Option<(Fall, LagLine)> {
+    let period = releases.first()?.units.0;
+    let of = |lag: f64| {
+        let fall = with_own_delays(releases, dampings, (slack, lag))?;
+        let line = LagLine::through(&late(releases, &fall.pull, dampings, (slack, lag)), lag, period)?;
+        (line.lag.low > 0.0).then_some((fall, line))
+    };
+    LAGS.iter().find_map(|first| {
+        let found = of(first * period)?;
+        (1..PASSES).try_fold(found, |(_, line), _| of(line.lag.value))
+    })
+}
+
+/// Of each release the voltage before it and the delay with which a T/J explains it: the middle of its set.
+fn late(releases: &[Release], pull: &Estimate, dampings: (f64, f64), (slack, lag): (f64, f64)) -> Vec<Late> {
+    let of = |release: &Release| {
+        let explains = |delay: &f64| {
+            (0..DAMPINGS).any(|k| {
+                let shape = Shape { damping: between(dampings, k), lag, slack };
+                release.narrow(*delay, shape, &mut (pull.low, pull.high)).is_ok()
+            })
+        };
+        let ends = delays(releases).filter(explains).fold(None, |ends: Option<(f64, f64)>, delay| {
+            Some(ends.map_or((delay, delay), |(soonest, _)| (soonest, delay)))
+        });
+        let (soonest, latest) = ends?;
+        (release.falls() && release.before > 0.0)
+            .then(|| (libm::log(release.before), 0.5 * (soonest + latest)))
+    };
+    releases.iter().filter_map(of).collect()
+}
+
+fn with_own_delays(releases: &[Release], dampings: (f64, f64), (slack, lag): (f64, f64)) -> Option<Fall> {
     let (mut low, mut high, mut soonest, mut latest) = (f64::INFINITY, 0.0_f64, f64::INFINITY, 0.0_f64);
     for k in 0..DAMPINGS {
         let damping = between(dampings, k);
@@ -243,9 +357,11 @@ fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Op
             let mut own = (f64::INFINITY, 0.0_f64);
             for delay in delays(releases) {
                 let mut bounds = (0.0, f64::INFINITY);
-                if release.narrow(delay, damping, slack, &mut bounds).is_ok() {
+                if release.narrow(delay, Shape { damping, lag, slack }, &mut bounds).is_ok() {
                     own = (own.0.min(bounds.0), own.1.max(bounds.1));
-                    ends = (ends.0.min(delay), ends.1.max(delay));
+                    if release.falls() {
+                        ends = (ends.0.min(delay), ends.1.max(delay));
+                    }
                 }
             }
             common = (common.0.max(own.0), common.1.min(own.1));
@@ -259,6 +375,7 @@ fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Op
     (low < high && high.is_finite()).then(|| Fall {
         pull: middle(low, high),
         delay: middle(soonest, latest),
+        lag: None,
         looser: Some(slack),
     })
 }
@@ -276,7 +393,7 @@ fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Un
             let mut bounds = (0.0, f64::INFINITY);
             let mut explained = 0;
             let failed = releases.iter().enumerate().find_map(|(n, release)| {
-                let failed = release.narrow(delay, damping, slack, &mut bounds).err();
+                let failed = release.narrow(delay, Shape { damping, lag: 0.0, slack }, &mut bounds).err();
                 explained += failed.unwrap_or(release.counts.len());
                 failed.map(|at| (n, at))
             });
@@ -302,6 +419,7 @@ fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Un
     Ok(Fall {
         pull: Estimate { value: sums[1] / sums[0], low, high },
         delay: Estimate { value: sums[2] / sums[0], low: (soonest - half).max(0.0), high: latest + half },
+        lag: None,
         looser: None,
     })
 }

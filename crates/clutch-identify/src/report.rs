@@ -1,9 +1,9 @@
 //! Findings of recordings on a shaft, and what they cannot show.
 
-use crate::break_away::{self, BreakAway, Known, break_aways};
+use crate::break_away::{self, BreakAway, Known, break_aways, mean_volts};
 use crate::confidence::{DEVIATIONS, FALL};
-use crate::recording::Recording;
-use crate::release::{self, Fall, Release};
+use crate::recording::{Recording, at_pad};
+use crate::release::{self, Fall, Release, Unexplained};
 use crate::ride::{Place, Ride, Told, rides, uneven, waves};
 use crate::{DAMPINGS, Estimate, unlike};
 use serde::Serialize;
@@ -95,11 +95,16 @@ pub struct Report {
 #[must_use]
 pub fn identify(recordings: &[Recording]) -> Report {
     let releases: Vec<Release> = recordings.iter().flat_map(release::releases).take(MOST).collect();
-    let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).take(MOST).collect();
-    let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
+    let breaks_away = mean_volts(&recordings.iter().flat_map(break_aways).take(MOST).collect::<Vec<_>>());
+    let fall = (!releases.is_empty()).then(|| release::fall(&releases, DAMPINGS, breaks_away));
+    let lag = fall.as_ref().and_then(|fall| fall.as_ref().ok()).map_or(0.0, Fall::lags);
+    let seen = at_pad(recordings, lag);
+    let slips: Vec<BreakAway<'_>> = seen.iter().flat_map(break_aways).take(MOST).collect();
+    let rides: Vec<Ride<'_>> = seen.iter().flat_map(rides).collect();
     let counted = (releases.len(), slips.len());
-    let stretches = recordings.iter().flat_map(uneven).collect::<Vec<_>>();
-    let motion = Motion::of(&releases, rides, &stretches, unlike::sticks(recordings));
+    let stretches = seen.iter().flat_map(uneven).collect::<Vec<_>>();
+    let closer = |within| release::fall(&releases, within, breaks_away);
+    let motion = Motion::of(fall, &closer, rides, &stretches, unlike::sticks(&seen));
     let (ratio, stribeck) = motion.at_rest(&slips);
     let no_ride = motion
         .cause
@@ -121,9 +126,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
             },
             Finding::Known,
         ),
-        lag: refused(
-            "the delay holds dead time and lag together, which no experiment of this verb separates; the voltage measured at the brake does",
-        ),
+        lag: motion.lag(),
         each: refused(
             "counts and volts do not determine them, as all of them scaled alike move alike; a second experiment with a known mass added \
              does",
@@ -150,14 +153,17 @@ struct Motion {
 }
 
 impl Motion {
+    /// `fall`: of the releases, where there are any; `closer` the same for another range of C/J.
     fn of(
-        releases: &[Release],
+        fall: Option<Result<Fall, Unexplained>>,
+        closer: &dyn Fn((f64, f64)) -> Result<Fall, Unexplained>,
         rides: Vec<Ride<'_>>,
         stretches: &[Ride<'_>],
         sticks: Option<String>,
     ) -> Motion {
         let rates = |rides: &[Ride<'_>]| rides.iter().map(|ride| ride.rate).collect::<Vec<_>>();
-        let found = rates(&rides);
+        let mut found = rates(&rides);
+        found.sort_by(f64::total_cmp);
         let unknown = |cause: Option<String>| Motion {
             rates: found.clone(),
             told: Vec::new(),
@@ -167,16 +173,22 @@ impl Motion {
             unexplained: cause.iter().cloned().collect(),
             cause,
         };
-        if releases.is_empty() {
-            return unknown(None);
-        }
-        let mut fall = match release::fall(releases, DAMPINGS) {
-            Ok(fall) => fall,
-            Err(at) => return unknown(Some(unlike::fall_refused(&at))),
+        let mut fall = match fall {
+            None => return unknown(None),
+            Some(Ok(fall)) => fall,
+            Some(Err(at)) => return unknown(Some(unlike::fall_refused(&at))),
         };
         let (told, mut unexplained) = tell(rides, &fall);
         let (rides, mut told): (Vec<_>, Vec<_>) = told.into_iter().unzip();
-        let bristles = || told.first().and_then(|slow| unlike::bristles(stretches, slow, &fall));
+        // With C/J, releases determine T/J more closely.
+        let of_rides = |told: &[Told]| {
+            let line = Line::through(told);
+            let damping = line.as_ref().and_then(|line| line.damping(&fall));
+            let within = damping.map(|c| (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0)));
+            (line, damping, within.map(closer))
+        };
+        let close = of_rides(&told).2.and_then(Result::ok).unwrap_or_else(|| fall.clone());
+        let bristles = || told.first().and_then(|slow| unlike::bristles(stretches, slow, &close));
         if let Some(cause) = bristles().or(sticks) {
             return Motion { fall: Some(fall), ..unknown(Some(cause)) };
         }
@@ -191,21 +203,17 @@ impl Motion {
                 100.0 * share
             ));
         }
-        let line = Line::through(&told);
-        let damping = line.as_ref().and_then(|line| line.damping(&fall));
-        // With C/J, releases determine T/J more closely.
-        if let Some(c) = damping {
-            let within = (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0));
-            match release::fall(releases, within) {
-                Ok(closer) if closer.looser <= fall.looser => fall = closer,
-                _ => {
-                    let cause = unknown(Some(CONTRADICTED.to_owned()));
-                    unexplained.extend(cause.unexplained.clone());
-                    return Motion { fall: Some(fall), unexplained, ..cause };
-                }
+        let (line, damping, close) = of_rides(&told);
+        match close {
+            None => {}
+            Some(Ok(close)) if close.looser <= fall.looser => fall = close,
+            Some(_) => {
+                let cause = unknown(Some(CONTRADICTED.to_owned()));
+                unexplained.extend(cause.unexplained.clone());
+                return Motion { fall: Some(fall), unexplained, ..cause };
             }
         }
-        if let Some(slack) = fall.looser {
+        if let Some(slack) = fall.looser.filter(|_| fall.lags() <= 0.0) {
             unexplained.push(format!(
                 "releases: no one delay explains their counts; one for each does, edges being off by {slack:.2} counts: a lag of the \
                  actuator, or a torque that varies"
@@ -221,7 +229,7 @@ impl Motion {
         let (fall, slowest) = (self.fall.as_ref(), self.told.first());
         let known = fall.zip(self.hold).zip(slowest).map(|((fall, hold), slow)| Known {
             pull: fall.pull.value,
-            delay: fall.delay.value,
+            delay: fall.dead_time(),
             damping: self.damping.map_or(0.0, |c| c.value),
             friction: 1.0 / hold.value,
             // No disc is so even that a model holds to the last count.
@@ -247,6 +255,17 @@ impl Motion {
             ),
         };
         (ratio, stribeck)
+    }
+
+    /// The lag: a law that knows it needs its value, so that one that may be none is none of its own.
+    fn lag(&self) -> Finding {
+        let two = "releases from one voltage hold dead time and lag together: at least three more from a voltage higher or lower by a \
+                   third, which stops the shaft, separate them";
+        match (&self.fall, &self.cause) {
+            (Some(fall), _) => fall.lag.map_or_else(|| refused(two), Finding::Known),
+            (None, Some(cause)) => refused(cause),
+            (None, None) => refused(two),
+        }
     }
 
     /// A finding of the releases.
@@ -281,11 +300,11 @@ fn ripple(slow: &Told) -> Estimate {
 /// more than its size.
 fn tell<'a>(mut rides: Vec<Ride<'a>>, fall: &Fall) -> (Vec<(Ride<'a>, Told)>, Vec<String>) {
     rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
-    let waves = waves(&rides.iter().collect::<Vec<_>>(), fall.pull.value, fall.delay.value);
+    let waves = waves(&rides.iter().collect::<Vec<_>>(), fall.pull.value, fall.dead_time());
     let mut share = None;
     let (mut even, mut left_out) = (Vec::new(), Vec::new());
     for ride in rides {
-        let mut told = ride.told(fall.pull.value, fall.delay.value, waves, share);
+        let mut told = ride.told(fall.pull.value, fall.dead_time(), waves, share);
         share = share.or(Some(told.ripple.0));
         if told.slowest < STOPS {
             left_out.push(format!(

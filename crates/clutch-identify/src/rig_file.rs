@@ -99,8 +99,10 @@ pub(crate) fn around(low: f64, high: f64) -> (f64, f64) {
 pub struct RigFile {
     model: Table,
     bounds: Table,
-    /// Delay from a sample's voltage to its effect, s.
+    /// Delay from a sample's voltage to its effect, s: dead time and lag together.
     pub delay: Option<Estimate>,
+    /// Lag of the actuator, s.
+    pub lag: Option<Estimate>,
     /// Root mean square of friction's variation along the disc, as a share.
     pub ripple: Option<Estimate>,
     /// Waves of that variation per turn.
@@ -152,6 +154,7 @@ impl RigFile {
             model: table("model")?,
             bounds: table("bounds")?,
             delay: told("delay_s"),
+            lag: told("lag_s"),
             ripple: told("ripple_rms"),
             waves: waves.and_then(Value::as_float).filter(|waves| (1.0..=MOST_WAVES).contains(waves)),
             stribeck: told("stribeck_velocity_rad_s"),

@@ -36,8 +36,8 @@ pub fn fall_refused(at: &Unexplained) -> String {
             format!("{number} releases are no free fall under a steady torque: {VARIES}")
         }
         Some(Apart::Delays(low, high)) => format!(
-            "the releases have delays between {:.1} and {:.1} ms: an actuator with a lag; one with a lag of less than two periods, \
-             or releases from one voltage alone, determine it",
+            "the releases have delays between {:.1} and {:.1} ms, which no one lag explains: one of more than three periods, or a torque \
+             that varies; an actuator with a shorter lag, under a steady weight, shows T/J",
             1e3 * low,
             1e3 * high
         ),
@@ -54,7 +54,7 @@ pub fn fall_refused(at: &Unexplained) -> String {
 #[must_use]
 pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<String> {
     // The delay may be wrong within its interval, and is another way for a voltage to be late.
-    let e = fall.delay;
+    let e = fall.delay.less(fall.lags());
     let delays = [e.low, 0.5 * (e.low + e.value), e.value, 0.5 * (e.value + e.high), e.high];
     let density = |counts: f64| -> f64 {
         let with = |delay: f64| -> f64 {

@@ -100,6 +100,47 @@ fn a_hidden_rig_is_found_and_what_a_log_does_not_show_is_refused() {
     assert!(refusal(&one_rate.stribeck).contains("break-aways"), "{one_rate:?}");
 }
 
+/// A dead time of one period beside a lag: releases from two voltages determine both, and neither spoils what else is found.
+#[test]
+fn a_lag_is_told_apart_from_a_dead_time() {
+    let torque = 0.2094 * 9.81 * 0.024;
+    let hold = torque / (0.118 * 0.14);
+    let scenario = Scenario::parse("rig", RIG, &[]).unwrap();
+    let lag_of = |all: &[Recording]| -> Report {
+        let report = identify(all);
+        assert_known(&report.pull, torque / 0.0014, 0.01 * torque / 0.0014);
+        assert_known(&report.hold, hold, 0.01 * hold);
+        assert_known(&report.ratio, 0.185 / 0.118, 0.1);
+        assert_known(&report.damping, 1.5, 0.4);
+        report
+    };
+    for lag in [0.001, 0.0025] {
+        let all = recordings(&[("rig.actuator_time_constant_s", &lag.to_string())]);
+        let report = lag_of(&all);
+        assert_known(&report.lag, lag, 0.25 * lag);
+        assert_known(&report.delay, 1e-3 + lag, 0.5e-3);
+        assert!(report.unexplained.is_empty(), "{:?}", report.unexplained);
+        // The rig that is believed in has both.
+        let file = RigFile::parse("rig.toml", &rig_file(&report, &scenario).unwrap()).unwrap();
+        let rig = believed(&scenario, Some(&file)).unwrap().scenario.params().rig.clone();
+        assert_eq!(
+            (rig.delay_ticks, rig.actuator_time_constant),
+            (1, Some(report.lag.known().unwrap().value))
+        );
+        // From one voltage they are one.
+        let one = of(&all, &["releases", "crawl", "ride_5", "ride_60"]);
+        assert!(refusal(&one.lag).contains("from a voltage higher or lower"), "{:?}", one.lag);
+    }
+    let without = lag_of(&recordings(&[]));
+    let none = without.lag.known().unwrap();
+    assert!(none.low <= 0.0 && none.high < 0.2e-3, "{none:?}");
+    let file = RigFile::parse("rig.toml", &rig_file(&without, &scenario).unwrap()).unwrap();
+    let lagging =
+        Scenario::parse("rig", RIG, &[("rig.actuator_time_constant_s".into(), "0.002".into())]).unwrap();
+    let rig = believed(&lagging, Some(&file)).unwrap().scenario.params().rig.clone();
+    assert_eq!((rig.delay_ticks, rig.actuator_time_constant), (1, None));
+}
+
 /// The filter of the rides takes waves of a ripple that the encoder sees.
 #[test]
 fn an_encoder_that_sees_no_short_wave_is_enough() {
@@ -172,6 +213,18 @@ fn a_coarse_encoder_under_a_narrow_jump_is_part_of_the_remedy() {
     assert!(!with("20000").contains("jump_deg"), "{}", with("20000"));
 }
 
+/// A ride whose rate comes down to that of another is not ridden twice, and none becomes shorter.
+#[test]
+fn a_limit_lowers_the_rates_of_the_rides() {
+    for (fastest, rides) in [
+        (5.0, vec![(5.0, 10.0)]),
+        (10.0, vec![(10.0, 7.0), (5.0, 10.0)]),
+        (30.0, vec![(20.0, 7.0), (5.0, 10.0), (30.0, 5.0)]),
+    ] {
+        assert_eq!(Programme::within(Some(fastest)).unwrap().rides, rides);
+    }
+}
+
 /// Steps of the converter are no ripple.
 #[test]
 fn an_even_disc_may_have_none() {
@@ -186,13 +239,13 @@ fn a_count_that_no_fall_explains_is_named() {
     let mut bad: Vec<Recording> = part(&all, "releases").into_iter().cloned().collect();
     let found = releases(&bad[0]);
     assert_eq!(found.len(), 12);
-    assert!(fall(&found, DAMPINGS).is_ok());
+    assert!(fall(&found, DAMPINGS, None).is_ok());
     // The fifth release loses ten counts on its way.
     let first = found[4].place.1 as usize;
     for tick in &mut bad[0].ticks[first + 20..] {
         tick.counts -= 10;
     }
-    let at = fall(&releases(&bad[0]), DAMPINGS).unwrap_err();
+    let at = fall(&releases(&bad[0]), DAMPINGS, None).unwrap_err();
     assert_eq!(at.name, "releases");
     assert!((first..first + 40).contains(&(at.tick as usize)), "{at:?} for {first}");
     let report = identify(&bad);

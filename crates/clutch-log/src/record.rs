@@ -10,8 +10,7 @@ use clutch_core::{Dac, FixedCounts, Real, law};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Standing};
 use prost::Message;
 
-/// The most terms that a law has in a log.
-pub const MAX_TERMS: usize = 8;
+pub use clutch_core::law::MAX_TERMS;
 
 /// Terms of a law: up to [`MAX_TERMS`], without an allocation. Terms beyond them are left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

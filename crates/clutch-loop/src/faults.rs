@@ -337,7 +337,7 @@ impl Given {
             "ms" => self.ms = Some(at_least_0(key, value)? / 1000.0),
             "counts" => {
                 let n = value.parse::<i32>();
-                self.counts = Some(n.map_err(|_| format!("counts = {value} is not a whole number"))?);
+                self.counts = Some(n.map_err(|_| expected("a whole number of counts"))?);
             }
             "volts" if value == "last" => self.volts = Some(StuckAt::Last),
             "volts" => self.volts = Some(StuckAt::Volts(number(key, value)?)),
@@ -436,12 +436,12 @@ fn unknown(what: &str, word: &str, known: &[&str]) -> String {
 
 fn number(key: &str, value: &str) -> Result<f64, String> {
     let number = value.parse::<f64>().ok().filter(|x| x.is_finite());
-    number.ok_or_else(|| format!("{key} = {value} is not a number"))
+    number.ok_or_else(|| format!("{key} = {value}: expected a number"))
 }
 
 fn at_least_0(key: &str, value: &str) -> Result<f64, String> {
     let x = number(key, value)?;
-    if x >= 0.0 { Ok(x) } else { Err(format!("{key} = {value} is below 0")) }
+    if x >= 0.0 { Ok(x) } else { Err(format!("{key} = {value}: expected a number of at least 0")) }
 }
 
 impl fmt::Display for FaultKind {
@@ -567,11 +567,11 @@ mod tests {
             ("explode:at=1", "unknown kind explode"),
             ("drop", "neither at nor p"),
             ("drop:p=2", "p = 2 is not a probability"),
-            ("drop:p=x", "p = x is not a number"),
-            ("drop:at=-1", "below 0"),
+            ("drop:p=x", "p = x: expected a number"),
+            ("drop:at=-1", "at = -1: expected a number of at least 0"),
             ("drop:at=1,ms=3", "a key that drop does not have"),
             ("delay:at=1", "delay needs ms"),
-            ("jump:at=1,counts=1.5", "not a whole number"),
+            ("jump:at=1,counts=1.5", "expected a whole number of counts"),
             ("channel:at=1,dead=c", "dead = c: expected a or b"),
             ("scale:at=1", "scale needs factor"),
             ("prescaler:at=1,factor=0", "factor = 0: expected 0.01 to 1000"),

@@ -28,6 +28,7 @@ use crate::to_log::PRESENT_CODE;
 use crate::tuning::Tuning;
 use crate::watch::Watch;
 use clutch_core::law::Law;
+use clutch_core::params::CYCLES;
 use clutch_core::supervisor::Cause;
 use clutch_core::{
     ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo,
@@ -681,7 +682,7 @@ impl Course<'_> {
             ("gains", gains.to_owned()),
             ("as sampled", cleared.sampled.short_line(cleared.proven.as_ref())),
             ("safe state", format!("{safe}: {}", safety.reason.0)),
-            ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
+            ("watchdog", format!("{} {} on the board", safety.limits.watchdog_cycles, CYCLES.text)),
         ];
         rows.extend(describe_system().first().map(|system| ("system", system.clone())));
         let mut remarks = start_notes(hello);

@@ -92,9 +92,11 @@ pub struct Settings {
     set_knots: u16,
 }
 
-impl Default for Settings {
+impl Settings {
+    /// None set.
     #[inline] // in place: a copy of it would be on the stack of who keeps it
-    fn default() -> Self {
+    #[must_use]
+    pub const fn empty() -> Self {
         const NONE: Knot = Knot { time_us: 0, position: FixedCounts(0) };
         Settings {
             values: [0; SETTINGS],
@@ -102,6 +104,13 @@ impl Default for Settings {
             knots: [NONE; MAX_KNOTS],
             set_knots: 0,
         }
+    }
+}
+
+impl Default for Settings {
+    #[inline]
+    fn default() -> Self {
+        Settings::empty()
     }
 }
 

@@ -97,7 +97,7 @@ impl Checks {
 
     /// All but one.
     #[must_use]
-    pub fn without(self, cause: Cause) -> Checks {
+    pub const fn without(self, cause: Cause) -> Checks {
         Checks(self.0 & !Checks::bit(cause))
     }
 
@@ -109,11 +109,11 @@ impl Checks {
 
     /// True if the check is on.
     #[must_use]
-    pub fn has(self, cause: Cause) -> bool {
+    pub const fn has(self, cause: Cause) -> bool {
         self.0 & Checks::bit(cause) != 0
     }
 
-    fn bit(cause: Cause) -> u32 {
+    const fn bit(cause: Cause) -> u32 {
         1_u32.wrapping_shl(cause as u32)
     }
 }

@@ -17,7 +17,9 @@ pub(crate) type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 /// A rig, as nobody knows it.
 pub(crate) struct Truth {
     pub(crate) scenario: Scenario,
+    /// Dead time and lag together, s.
     pub(crate) delay: f64,
+    pub(crate) lag: f64,
     pub(crate) pull: f64,
     pub(crate) hold: f64,
     pub(crate) ripple: f64,
@@ -38,6 +40,13 @@ pub(crate) fn other_waves(seed: u64) -> Vec<(String, String)> {
         _ => (lowest, lowest, lowest),
     };
     waves(lowest, spacing, highest)
+}
+
+/// A lag of the actuator, for a seed: 0.3 to 3 ms, the same number of each size.
+pub(crate) fn lag(seed: u64) -> Vec<(String, String)> {
+    let mut rng = Pcg64::seed_from_u64(seed ^ 0x6c61_6773);
+    let seconds = 0.3e-3 * 10.0_f64.powf(rng.random_range(0.0..1.0_f64));
+    vec![("rig.actuator_time_constant_s".to_owned(), format!("{seconds:?}"))]
 }
 
 /// The keys of a ripple's waves.
@@ -81,8 +90,10 @@ pub(crate) fn truth_with(seed: u64, set: &Set) -> Outcome<Truth> {
     let scenario = Scenario::parse("rig", &text, set)?;
     let torque = mass * 9.81 * 0.024;
     let gain = clutch_core::Actuator::<f64>::new(&scenario.spec().rig.actuator)?.brake_gain();
+    let lag = scenario.params().rig.actuator_time_constant.unwrap_or(0.0);
     Ok(Truth {
-        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>(),
+        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>() + lag,
+        lag,
         scenario,
         pull: torque / inertia,
         hold: torque / (dynamic * gain),

@@ -24,12 +24,10 @@ pub(crate) enum Unlike {
     Scaling,
     /// A disc not square to its shaft: one wave or two in a turn, of 3 to 15 % of friction.
     Runout,
-    /// An actuator with a lag of 1 to 3 ms.
-    Lag,
 }
 
 /// All of them, their names, and a word by which a report names the cause.
-pub(crate) const KINDS: [(Unlike, &str, &str); 7] = [
+pub(crate) const KINDS: [(Unlike, &str, &str); 6] = [
     (Unlike::Ramp, "torque that rises or falls by 3 to 20 % in a minute", "a torque that varies"),
     (Unlike::Sine, "sine of 2 to 15 % of the torque, 0.05 to 5 Hz", "a torque that varies"),
     (Unlike::Hand, "hand, 5 to 16 % rms, 0.2 to 5 Hz", "a torque that varies"),
@@ -40,7 +38,6 @@ pub(crate) const KINDS: [(Unlike, &str, &str); 7] = [
     ),
     (Unlike::Scaling, "bristles that scale with it (LuGre), 0.2 to 1 counts", "bristles"),
     (Unlike::Runout, "run-out of 3 to 15 %, one wave or two", "not square"),
-    (Unlike::Lag, "lag of 1 to 3 ms", "lag"),
 ];
 
 fn chosen(base: &Scenario, without: &str, set: &[(&str, f64)]) -> Result<Scenario, ExperimentError> {
@@ -133,7 +130,6 @@ pub(crate) fn recordings(kind: Unlike, seed: u64) -> Outcome<(Truth, Option<Vec<
                 }
                 Scenario::from_table(base.name(), waves, &[])?
             }
-            Unlike::Lag => chosen(base, "", &[("rig.actuator_time_constant_s", share(1e-3, 3e-3))])?,
         };
         runner.run(name, &unlike)
     };

@@ -9,7 +9,7 @@ type Row = (&'static str, &'static str, f64);
 
 const ROWS: [Row; 21] = [
     ("period_s", "period in µs, of sampling.period_us", 1e6),
-    ("counts_per_rev", "counts per turn, of rig.encoder.counts_per_rev", 1.0),
+    ("counts_per_rev", "counts per revolution, of rig.encoder.counts_per_rev", 1.0),
     ("inertia", "J in kg m², of [model] and [bounds]", 1.0),
     ("drive_torque", "T_u in N m, of [model] and [bounds]", 1.0),
     ("viscous_damping", "C_d in N m s/rad, of [model] and [bounds]", 1.0),

@@ -36,7 +36,7 @@ use crate::tables::{
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::{Asked, Law, Output, Shell};
-use clutch_core::params::{Choice, Kind, Params, Row};
+use clutch_core::params::{Choice, Info, Kind, Params, Row};
 use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
     ActuatorKind, Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, ParamError, Plant, Real, Supervisor,
@@ -851,7 +851,8 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
     })?;
     let mut merged = RigParams::base_table(base);
     // Alternatives: naming one drops the base's other.
-    for choice in ["actuator", "drive", "friction"] {
+    let nested = <RigParams as Params<f64>>::INFO.table().map_or(&[][..], |info| info.nested);
+    for choice in nested.iter().filter(|n| matches!(n.info, Info::Choice(_))).map(|n| n.key) {
         if let (Some(Value::Table(own)), Some(Value::Table(base))) = (own.get(choice), merged.get(choice))
             && own.keys().any(|k| !base.contains_key(k))
         {
