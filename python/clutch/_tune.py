@@ -70,7 +70,8 @@ class Identified:
     Attributes
     ----------
     parameters : dict of str to Estimate
-        The findings: ``pull_rad_s2`` (T/J), ``delay_s`` (dead time and lag together), ``lag_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
+        The findings: ``pull_rad_s2`` (T/J), ``delay_s`` (dead time and lag together), ``lag_s``,
+        ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
         ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J). Of a motor axis, torques over its torque per volt:
         ``break_forwards_v``, ``break_backwards_v``, ``slide_forwards_v``, ``slide_backwards_v``, ``load_v``,
         ``viscous_v_s_rad`` (C/K), ``inertia_v_s2_rad`` (J/K), and velocity, delay and ripple as above.

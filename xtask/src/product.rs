@@ -99,8 +99,10 @@ pub(crate) fn is_product(path: &str) -> bool {
 
 fn is_generated(path: &str, text: &str) -> bool {
     let listed = GENERATED.iter().any(|(generated, _)| *generated == path);
-    let says = |line: &str| ["enerated", "ritten by `cargo"].iter().any(|words| line.contains(words));
-    listed && text.lines().take(5).any(says)
+    let says = |line: &str| {
+        ["enerated", "ritten by `cargo", "ritten by `clutch"].iter().any(|words| line.contains(words))
+    };
+    listed && text.lines().take(12).any(says)
 }
 
 fn code(path: &str, text: &str) -> Vec<String> {

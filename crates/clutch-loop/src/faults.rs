@@ -584,7 +584,7 @@ mod tests {
             ("above-top:at=1,periods=2", "a key that above-top does not have"),
             ("drop:at", "has no ="),
             ("drop:at=1,where=up", "unknown key where"),
-            ("drop:at=nan", "not a number"),
+            ("drop:at=nan", "at = nan: expected a number"),
             ("drop:p=0.1,p=0.2", "p is given twice"),
         ] {
             let error = text.parse::<Fault>().unwrap_err().to_string();
