@@ -8,7 +8,7 @@
 //! (n_j − n_i − 1)/(f_j − f_i) < (T/J)/q < (n_j − n_i + 1)/(f_j − f_i)        f_j > f_i
 //! ```
 //!
-//! An actuator with a lag lets go gradually, each release with a delay of its own: [`crate::lag`].
+//! An actuator with a lag lets go gradually, each release with a delay of its own: `lag.rs`.
 //!
 //! Nothing here is a matter of chance: a value outside the set contradicts a count.
 
