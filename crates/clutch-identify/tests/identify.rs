@@ -219,7 +219,9 @@ fn a_limit_lowers_the_rates_of_the_rides() {
     for (fastest, rides) in [
         (5.0, vec![(5.0, 10.0)]),
         (10.0, vec![(10.0, 7.0), (5.0, 10.0)]),
+        (20.0, vec![(20.0, 7.0), (5.0, 10.0)]),
         (30.0, vec![(20.0, 7.0), (5.0, 10.0), (30.0, 5.0)]),
+        (60.0, vec![(20.0, 7.0), (5.0, 10.0), (60.0, 5.0)]),
     ] {
         assert_eq!(Programme::within(Some(fastest)).unwrap().rides, rides);
     }
