@@ -1,5 +1,6 @@
 //! The rig as it is believed to be: what is simulated where the rig itself is to be spared.
 
+use crate::Estimate;
 use crate::rig_file::RigFile;
 use clutch_core::friction::FrictionParams;
 use clutch_core::{ActuatorKind, ActuatorParams, Interval};
@@ -119,7 +120,7 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
         }
     }
     // A lag that may be none is believed to be none.
-    let lag = file.and_then(|file| file.lag).map(|lag| if lag.low > 0.0 { lag.value } else { 0.0 });
+    let lag = file.and_then(|file| file.lag).map(Estimate::if_any);
     if let Some(delay) = file.and_then(|file| file.delay) {
         let delay = delay.less(lag.unwrap_or(0.0));
         let ticks = (delay.value / period).round();
@@ -139,14 +140,11 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
             rig.insert(key.to_owned(), value.clone());
         }
     }
-    match lag {
-        Some(lag) if lag > 0.0 => {
+    if let Some(lag) = lag {
+        rig.remove("actuator_time_constant_s");
+        if lag > 0.0 {
             rig.insert("actuator_time_constant_s".to_owned(), Value::Float(lag));
         }
-        Some(_) => {
-            rig.remove("actuator_time_constant_s");
-        }
-        None => {}
     }
     let torque = spec.model.drive_torque;
     let drive = if kind == ActuatorKind::Brake { weight(&spec.rig.drive, torque) } else { load(torque) };

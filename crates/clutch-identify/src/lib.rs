@@ -55,6 +55,12 @@ impl Estimate {
         Estimate { value: left(self.value), low: left(self.low), high: left(self.high) }
     }
 
+    /// Its value, of one that is surely there; 0 of one whose interval begins at 0 or below.
+    #[must_use]
+    pub fn if_any(self) -> f64 {
+        if self.low > 0.0 { self.value } else { 0.0 }
+    }
+
     /// `true` if a value lies within.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {

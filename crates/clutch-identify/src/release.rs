@@ -63,10 +63,10 @@ pub struct Fall {
 }
 
 impl Fall {
-    /// Lag, s, where there is one: 0 of an interval that begins there.
+    /// Lag, s; 0 where there may be none.
     #[must_use]
     pub fn lags(&self) -> f64 {
-        self.lag.filter(|lag| lag.low > 0.0).map_or(0.0, |lag| lag.value)
+        self.lag.map_or(0.0, Estimate::if_any)
     }
 
     /// Delay without that lag, s.

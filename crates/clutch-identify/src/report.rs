@@ -187,8 +187,9 @@ impl Motion {
             let within = damping.map(|c| (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0)));
             (line, damping, within.map(closer))
         };
-        let close = of_rides(&told).2.and_then(Result::ok).unwrap_or_else(|| fall.clone());
-        let bristles = || told.first().and_then(|slow| unlike::bristles(stretches, slow, &close));
+        let mut said = of_rides(&told);
+        let close = said.2.as_ref().and_then(|close| close.as_ref().ok()).unwrap_or(&fall);
+        let bristles = || told.first().and_then(|slow| unlike::bristles(stretches, slow, close));
         if let Some(cause) = bristles().or(sticks) {
             return Motion { fall: Some(fall), ..unknown(Some(cause)) };
         }
@@ -202,8 +203,9 @@ impl Motion {
                  shaft: v_hold and C/J are as wide as that; rides over whole turns determine them more closely",
                 100.0 * share
             ));
+            said = of_rides(&told);
         }
-        let (line, damping, close) = of_rides(&told);
+        let (line, damping, close) = said;
         match close {
             None => {}
             Some(Ok(close)) if close.looser <= fall.looser => fall = close,
@@ -257,7 +259,7 @@ impl Motion {
         (ratio, stribeck)
     }
 
-    /// The lag: a law that knows it needs its value, so that one that may be none is none of its own.
+    /// The lag, which releases from one voltage do not show.
     fn lag(&self) -> Finding {
         let two = "releases from one voltage hold dead time and lag together: at least three more from a voltage higher or lower by a \
                    third, which stops the shaft, separate them";
