@@ -284,7 +284,7 @@ def _rig_file(identified: Identified | str | os.PathLike[str]) -> tuple[str, str
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """The best gains of a law.
+    """Gains of a law: its best, or the next behind a rare stick.
 
     Attributes
     ----------
@@ -309,7 +309,7 @@ class Candidate:
     error_bound_rad : float or None
         The bound proven on the error, rad; None where none is, or none was looked for.
     outcome : str
-        ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (it sticks from rest),
+        ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (it sticks on other discs, or from rest),
         ``"strays"``, ``"unstable"``.
     why : str
         The limiting condition, where it is uncertified or refused; else empty.
@@ -345,7 +345,7 @@ class Tuned:
     Attributes
     ----------
     candidates : tuple of Candidate
-        The best gains of each law, the smoothest first.
+        The best gains of each law, and the next behind a rare stick, the smoothest first.
     winner : Candidate or None
         The one that is given out; None if none is certified, or none starts from rest.
     verdict : str

@@ -385,7 +385,13 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
         words,
     };
     let tables = [
-        table("laws", "Laws", "The best gains of each law, the smoothest first.", laws, 1),
+        table(
+            "laws",
+            "Laws",
+            "The best gains of each law, and the next behind a rare stick, the smoothest first.",
+            laws,
+            1,
+        ),
         table(
             "gains",
             "Gains",

@@ -114,7 +114,7 @@ pub enum Verdict {
     NotLookedFor,
 }
 
-/// The best gains of a law.
+/// Gains of a law: its best, or the next behind a rare stick.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
     /// Law, and if it stands in a shell.
