@@ -17,7 +17,9 @@ use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
-use clutch_loop::realtime::{CycleSummary, RealtimeOptions, SPIN_US, Wait};
+use clutch_loop::realtime::{
+    CycleSummary, DEFAULT_PRIORITY, HIGHEST_PRIORITY, RealtimeOptions, SPIN_US, Wait,
+};
 use clutch_loop::release;
 use clutch_loop::session::{
     Announcement, Board, Event, Progress, Release, Session, SessionError, SessionOptions,
@@ -117,8 +119,8 @@ pub(crate) struct Loop {
     #[arg(long, alias = "cpu_affinity", value_name = "CORE")]
     cpu_affinity: Option<usize>,
     /// Priority of the control thread under SCHED_FIFO, 1 to 99; 0 stays with the ordinary scheduler.
-    #[arg(long, alias = "thread_priority", default_value_t = clutch_loop::realtime::DEFAULT_PRIORITY,
-        value_parser = clap::value_parser!(u8).range(0..=99))]
+    #[arg(long, alias = "thread_priority", default_value_t = DEFAULT_PRIORITY,
+        value_parser = clap::value_parser!(u8).range(0..=i64::from(HIGHEST_PRIORITY)))]
     thread_priority: u8,
     /// Effect of a late answer.
     #[arg(long, value_enum, default_value = "manage")]

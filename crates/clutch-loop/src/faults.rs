@@ -210,41 +210,68 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
-         kinds: drop, duplicate, corrupt, reorder, silence, lie (says = idle, encoder, converter or run), echo (periods), foreign (periods), above-top, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), contact (factor), lever, clock (factor), prescaler (factor), crystal (factor), reset\n\
-         keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
+         kinds: {}\n\
+         keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)",
+    kinds()
 )]
 pub struct FaultError {
     text: String,
     problem: String,
 }
 
-/// Names of kinds, as they are written.
-const KINDS: [&str; 24] = [
-    "drop",
-    "duplicate",
-    "corrupt",
-    "reorder",
-    "silence",
-    "lie",
-    "echo",
-    "foreign",
-    "above-top",
-    "delay",
-    "jitter",
-    "freeze",
-    "jump",
-    "channel",
-    "scale",
-    "loss",
-    "dac-stuck",
-    "dac-scale",
-    "contact",
-    "lever",
-    "clock",
-    "prescaler",
-    "crystal",
-    "reset",
+/// A kind of fault as it is written: its name, the key that it needs with the key's values, and what it reads; none if
+/// that key is missing.
+struct Written(&'static str, &'static str, fn(&mut Given) -> Option<Result<FaultKind, String>>);
+
+const KINDS: [Written; 24] = [
+    Written("drop", "", |_| plain(FaultKind::Drop)),
+    Written("duplicate", "", |_| plain(FaultKind::Duplicate)),
+    Written("corrupt", "", |_| plain(FaultKind::Corrupt)),
+    Written("reorder", "", |_| plain(FaultKind::Reorder)),
+    Written("silence", "", |_| plain(FaultKind::Silence)),
+    Written("lie", "says = idle, encoder, converter or run", |g| with(g.says.take(), FaultKind::Lie)),
+    Written("echo", "periods", |g| with(g.periods.take(), |n| FaultKind::Forged(Forgery::Echo(n)))),
+    Written("foreign", "periods", |g| with(g.periods.take(), |n| FaultKind::Forged(Forgery::OtherRun(n)))),
+    Written("above-top", "", |_| plain(FaultKind::Forged(Forgery::AboveTop))),
+    Written("delay", "ms", |g| with(g.ms.take(), FaultKind::Delay)),
+    Written("jitter", "ms", |g| with(g.ms.take(), FaultKind::Jitter)),
+    Written("freeze", "", |_| plain(FaultKind::EncoderFreeze)),
+    Written("jump", "counts", |g| with(g.counts.take(), FaultKind::EncoderJump)),
+    Written("channel", "dead = a or b", |g| with(g.dead.take(), FaultKind::EncoderChannel)),
+    Written("scale", "factor", |g| with(g.factor.take(), FaultKind::EncoderScale)),
+    Written("loss", "", |_| plain(FaultKind::EncoderLoss)),
+    Written("dac-stuck", "volts = a number or last", |g| with(g.volts.take(), FaultKind::DacStuck)),
+    Written("dac-scale", "factor", |g| with(g.factor.take(), FaultKind::DacScale)),
+    Written("contact", "factor", |g| {
+        g.factor_within(0.0, 1.0, ", the share of the pad's force that is left", FaultKind::Contact)
+    }),
+    Written("lever", "", |_| plain(FaultKind::Lever)),
+    Written("clock", "factor", |g| with(g.factor.take(), FaultKind::Clock)),
+    Written("prescaler", "factor", |g| g.factor_within(0.01, 1000.0, "", FaultKind::Prescaler)),
+    Written("crystal", "factor", |g| g.factor_within(0.01, 1000.0, "", FaultKind::Crystal)),
+    Written("reset", "", |_| plain(FaultKind::Reset)),
 ];
+
+/// A kind that needs no key.
+#[allow(clippy::unnecessary_wraps, reason = "as `with`: the shape that a row of KINDS reads")]
+fn plain(kind: FaultKind) -> Option<Result<FaultKind, String>> {
+    Some(Ok(kind))
+}
+
+/// A kind with the value that it needs.
+fn with<T>(value: Option<T>, kind: fn(T) -> FaultKind) -> Option<Result<FaultKind, String>> {
+    value.map(|value| Ok(kind(value)))
+}
+
+/// All kinds, each with what it needs.
+fn kinds() -> String {
+    let kinds = KINDS.map(|Written(name, needs, _)| match needs {
+        "" => name.to_owned(),
+        needs => format!("{name} ({needs})"),
+    });
+    kinds.join(", ")
+}
+
 /// Keys of faults, as they are written.
 const KEYS: [&str; 11] =
     ["at", "for", "p", "way", "ms", "counts", "volts", "factor", "periods", "says", "dead"];
@@ -367,49 +394,28 @@ impl Given {
         Ok(())
     }
 
-    /// The kind of that name, which takes the values that it needs.
+    /// The kind of that name, which takes the value that it needs.
     fn kind(&mut self, name: &str) -> Result<FaultKind, String> {
-        let needs = |key: &str| format!("{name} needs {key}");
-        let period = |factor: Option<f64>| match factor {
-            Some(x) if (0.01..=1000.0).contains(&x) => Ok(x),
-            Some(x) => Err(format!("factor = {x}: expected 0.01 to 1000")),
-            None => Err(needs("factor")),
+        let Some(Written(_, needs, read)) = KINDS.iter().find(|kind| kind.0 == name) else {
+            return Err(unknown("kind", name, &KINDS.map(|kind| kind.0)));
         };
-        let share = |factor: Option<f64>| match factor {
-            Some(x) if (0.0..=1.0).contains(&x) => Ok(x),
-            Some(x) => {
-                Err(format!("factor = {x}: expected 0 to 1, the share of the pad's force that is left"))
-            }
-            None => Err(needs("factor")),
-        };
-        Ok(match name {
-            "drop" => FaultKind::Drop,
-            "duplicate" => FaultKind::Duplicate,
-            "corrupt" => FaultKind::Corrupt,
-            "reorder" => FaultKind::Reorder,
-            "silence" => FaultKind::Silence,
-            "lie" => FaultKind::Lie(self.says.take().ok_or_else(|| needs("says"))?),
-            "echo" => FaultKind::Forged(Forgery::Echo(self.periods.take().ok_or_else(|| needs("periods"))?)),
-            "foreign" => {
-                FaultKind::Forged(Forgery::OtherRun(self.periods.take().ok_or_else(|| needs("periods"))?))
-            }
-            "above-top" => FaultKind::Forged(Forgery::AboveTop),
-            "delay" => FaultKind::Delay(self.ms.take().ok_or_else(|| needs("ms"))?),
-            "jitter" => FaultKind::Jitter(self.ms.take().ok_or_else(|| needs("ms"))?),
-            "freeze" => FaultKind::EncoderFreeze,
-            "jump" => FaultKind::EncoderJump(self.counts.take().ok_or_else(|| needs("counts"))?),
-            "channel" => FaultKind::EncoderChannel(self.dead.take().ok_or_else(|| needs("dead"))?),
-            "scale" => FaultKind::EncoderScale(self.factor.take().ok_or_else(|| needs("factor"))?),
-            "loss" => FaultKind::EncoderLoss,
-            "dac-stuck" => FaultKind::DacStuck(self.volts.take().ok_or_else(|| needs("volts"))?),
-            "dac-scale" => FaultKind::DacScale(self.factor.take().ok_or_else(|| needs("factor"))?),
-            "contact" => FaultKind::Contact(share(self.factor.take())?),
-            "lever" => FaultKind::Lever,
-            "clock" => FaultKind::Clock(self.factor.take().ok_or_else(|| needs("factor"))?),
-            "prescaler" => FaultKind::Prescaler(period(self.factor.take())?),
-            "crystal" => FaultKind::Crystal(period(self.factor.take())?),
-            "reset" => FaultKind::Reset,
-            _ => return Err(unknown("kind", name, &KINDS)),
+        let key = needs.split(' ').next().unwrap_or_default();
+        read(self).ok_or_else(|| format!("{name} needs {key}"))?
+    }
+
+    /// The kind with its factor, which lies in a range; `about` says more of it in an error.
+    fn factor_within(
+        &mut self,
+        least: f64,
+        most: f64,
+        about: &str,
+        kind: fn(f64) -> FaultKind,
+    ) -> Option<Result<FaultKind, String>> {
+        let x = self.factor.take()?;
+        Some(if (least..=most).contains(&x) {
+            Ok(kind(x))
+        } else {
+            Err(format!("factor = {x}: expected {least} to {most}{about}"))
         })
     }
 
@@ -521,7 +527,7 @@ mod tests {
             Ok(_) => String::new(),
             Err(e) => e.problem,
         };
-        for kind in KINDS {
+        for Written(kind, ..) in KINDS {
             assert!(!problem(kind).starts_with("unknown"), "{kind}: {}", problem(kind));
             let other = kind.to_uppercase();
             let asked = format!("unknown kind {other}: did you mean {kind}? Expected one of: drop, ");

@@ -12,7 +12,7 @@ use clutch_loop::faults::Fault;
 use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
 use clutch_loop::preflight::PreflightError;
-use clutch_loop::realtime::{RealtimeOptions, Wait};
+use clutch_loop::realtime::{HIGHEST_PRIORITY, RealtimeOptions, Wait};
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -93,8 +93,9 @@ pub(crate) fn run_loop<'py>(
     live: Option<u16>,
 ) -> PyResult<(Bound<'py, PyAny>, String, String, Option<String>)> {
     let scenario = native(scenario)?;
-    if thread_priority > 99 {
-        return Err(PyValueError::new_err(format!("thread_priority = {thread_priority}: expected 0 to 99")));
+    if thread_priority > HIGHEST_PRIORITY {
+        let refusal = format!("thread_priority = {thread_priority}: expected 0 to {HIGHEST_PRIORITY}");
+        return Err(PyValueError::new_err(refusal));
     }
     let given = [port.is_some(), board.is_some(), strict || !faults.is_empty()];
     if given.into_iter().filter(|given| *given).count() > 1 {

@@ -40,6 +40,9 @@ use std::sync::OnceLock;
 /// (50) it would starve the very driver it waits for.
 pub const DEFAULT_PRIORITY: u8 = 49;
 
+/// The highest priority that the control thread may have under SCHED_FIFO: Linux knows 1 to 99.
+pub const HIGHEST_PRIORITY: u8 = 99;
+
 /// Stack touched in advance, bytes. The control thread's stack must be at least four times this;
 /// that of a Rust thread is 2 MiB.
 pub const PREFAULTED_STACK: usize = 128 * 1024;
@@ -88,7 +91,7 @@ pub enum WaitMode {
 /// The control thread's requests to the kernel. The names are those of ros2_control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RealtimeOptions {
-    /// Priority under SCHED_FIFO, 1 to 99. 0 stays with the ordinary scheduler.
+    /// Priority under SCHED_FIFO, 1 to [`HIGHEST_PRIORITY`]. 0 stays with the ordinary scheduler.
     pub thread_priority: u8,
     /// Keep all memory of the process in RAM.
     pub lock_memory: bool,
