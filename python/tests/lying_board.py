@@ -32,6 +32,8 @@ COUNTS = 20_000
 PERIOD = 0.001
 RATE_DEG_S = 20.0
 BOOT, READY, ARMED, RUNNING, STOPPED, FAULTED = range(6)
+# docs/wire.md: the reason `Fault` of `Stop`; the kind of `Arm`, and the reason `Boot` for which it is refused.
+STOP_FAULT, ARM, REFUSED_BOOT = 2, 3, 16
 
 
 @dataclass
@@ -250,7 +252,7 @@ class Board:
             self.send("Configured", run=self.run, config=self.config, boot=77 + self.lie.boot)
         elif name == "Arm" and m["run"] == self.run:
             if m["boot"] != 77:
-                self.send("Refused", request=3, reason=9, value=0)
+                self.send("Refused", request=ARM, reason=REFUSED_BOOT, value=0)
                 return
             self.state, self.armed_at, self.start = ARMED, self.time, self.shaft.position
             self.send("Armed", run=self.run, config=self.config)
@@ -258,7 +260,7 @@ class Board:
             self.state, self.code, self.answered = RUNNING, m["code"], m["sequence"]
         elif name == "Stop" and m["run"] == self.run:
             if self.state in (ARMED, RUNNING):
-                self.make_safe(FAULTED if m["reason"] == 0 else STOPPED)
+                self.make_safe(FAULTED if m["reason"] == STOP_FAULT else STOPPED)
             self.send("Stopped", run=self.run, reason=m["reason"], code=self.code)
         elif name == "Ping":
             self.send("Pong", run=m["run"], nonce=m["nonce"], time_us=round(self.time * 1e6) % 2**32)
