@@ -64,7 +64,9 @@ if TYPE_CHECKING:
     from clutch._tables import *  # noqa: F403
     from clutch._tune import Candidate as Candidate
     from clutch._tune import Estimate as Estimate
+    from clutch._tune import Fell as Fell
     from clutch._tune import Identified as Identified
+    from clutch._tune import Rode as Rode
     from clutch._tune import Tuned as Tuned
     from clutch._tune import identify as identify
     from clutch._tune import tune as tune
@@ -87,7 +89,7 @@ _MODULES = {
     "_smooth": ["SmoothSpeed", "lowest_smooth_speed"],
     "_sweep": ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"],
     "_sweep_file": ["SweptFile", "sweep_to_file"],
-    "_tune": ["Candidate", "Estimate", "Identified", "Tuned", "identify", "tune"],
+    "_tune": ["Candidate", "Estimate", "Fell", "Identified", "Rode", "Tuned", "identify", "tune"],
 }
 _WHERE = {name: (module, name) for module, names in _MODULES.items() for name in names}
 _WHERE["__version__"] = ("_clutch", "VERSION")

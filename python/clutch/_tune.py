@@ -64,6 +64,67 @@ class Estimate:
         return self.low <= value <= self.high
 
 
+@dataclass(frozen=True, kw_only=True)
+class Fell:
+    """A release of a brake, and the fall that is believed.
+
+    Attributes
+    ----------
+    recording : str
+        The recording.
+    tick : int
+        Its tick with the first sample.
+    period_s : float
+        Time between two samples, s.
+    seen_rad : tuple of float
+        Way of each sample in whole counts, rad: the shaft is there, or less than a count farther.
+    believed_rad : tuple of float
+        Way as believed, rad.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> fell = clutch.identify("board_smc_2").falls[0]
+    >>> max(abs(a - b) for a, b in zip(fell.seen_rad, fell.believed_rad)) < 2 * 3.1416 / 20000
+    True
+    """
+
+    recording: str
+    tick: int
+    period_s: float
+    seen_rad: tuple[float, ...]
+    believed_rad: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rode:
+    """A ride at an even rate, or a pass of a motor axis.
+
+    Attributes
+    ----------
+    rate_rad_s : float
+        Rate, rad/s; backwards below 0.
+    seen_v : float
+        Voltage that keeps the shaft at that rate, V, in the mean along the disc.
+    deviation_v : float
+        Its standard deviation, V.
+    believed_v : float or None
+        The same as believed, V; None where the findings do not say it.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> rode = clutch.identify("board_smc_2").rides[0]
+    >>> abs(rode.seen_v - rode.believed_v) < 0.01 * rode.seen_v
+    True
+    """
+
+    rate_rad_s: float
+    seen_v: float
+    deviation_v: float
+    believed_v: float | None
+
+
 class Identified:
     """A rig as it was found to be, as :func:`clutch.identify` returns it.
 
@@ -90,6 +151,10 @@ class Identified:
         Numbers of each that were found: releases of a brake, hops of a motor.
     rides_rad_s : tuple of float
         Rates of the rides, rad/s; of a motor axis that goes backwards below 0.
+    falls : tuple of Fell
+        The releases of a brake beside the falls that are believed.
+    rides : tuple of Rode
+        Even rides, and passes of a motor axis, beside the voltage that is believed to keep the shaft at that rate.
 
     Examples
     --------
@@ -115,6 +180,10 @@ class Identified:
         self.hops: int = told["hops"]
         self.break_aways: int = told["break_aways"]
         self.rides_rad_s: tuple[float, ...] = tuple(told["rides_rad_s"])
+        seen: dict[str, list[dict[str, Any]]] = told["seen"]
+        ways = ("seen_rad", "believed_rad")
+        self.falls = tuple(Fell(**row | {way: tuple(row[way]) for way in ways}) for row in seen["falls"])
+        self.rides = tuple(Rode(**row) for row in seen["rides"])
 
     def to_toml(self) -> str:
         """Give the file of ``clutch identify --out``, which ``--identified`` takes.
@@ -151,7 +220,7 @@ class Identified:
         return Scenario.from_toml(_clutch.as_identified(self._base._native, self.to_toml()))
 
     def plot(self) -> Figure:
-        """Draw what was seen and what is believed: intervals in per cent of their values, and friction along the disc.
+        """Draw what was seen and what is believed: releases, rides, intervals, and friction along the disc.
 
         Returns
         -------

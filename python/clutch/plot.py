@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from clutch._paper import PaperFigure
     from clutch._run import Result
     from clutch._sweep import SweepResult
-    from clutch._tune import Identified
+    from clutch._tune import Fell, Identified, Rode
 
 __all__ = [
     "STYLE",
@@ -1272,7 +1272,9 @@ def identified(found: Identified) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Left each interval, in per cent of its value; right friction along the disc, where the slowest ride went.
+        Above what was seen, beside lines of what is believed: the releases of a brake, and the voltage that keeps the
+        shaft at each rate, with two standard deviations. Below each interval, in per cent of its value, and friction
+        along the disc, where the slowest ride went.
 
     Examples
     --------
@@ -1282,7 +1284,14 @@ def identified(found: Identified) -> Figure:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(180 * _MM, 70 * _MM), layout="constrained")
+    # A motor axis has no releases, and more parameters.
+    first = "falls" if found.falls else "intervals"
+    figure = plt.figure(figsize=(180 * _MM, 130 * _MM), layout="constrained")
+    axes = figure.subplot_mosaic([[first, "rides"], ["intervals", "map"]])
+    left, right = axes["intervals"], axes["map"]
+    if found.falls:
+        _falls(axes["falls"], found.falls)
+    _rides(axes["rides"], found.rides)
     told = [row for row in identified_rows() if row[0] in found.parameters]
     for row, (key, *_) in enumerate(reversed(told)):
         e = found.parameters[key]
@@ -1308,6 +1317,57 @@ def identified(found: Identified) -> Figure:
     right.set_xlabel("angle, °")
     right.set_ylabel("friction over its mean")
     return figure
+
+
+def _falls(ax: Axes, falls: Sequence[Fell]) -> None:
+    """Draw releases as points, one beside the other, and the falls that are believed as lines."""
+    import numpy as np
+
+    end = 0.0
+    for number, fell in enumerate(falls):
+        time = 1e3 * fell.period_s * np.arange(len(fell.seen_rad)) + end
+        seen = "seen, whole counts" if number == 0 else None
+        ax.plot(time, np.degrees(fell.seen_rad), ".", ms=1.5, color=_BLUE, label=seen)
+        believed = "believed" if number == 0 else None
+        ax.plot(time, np.degrees(fell.believed_rad), lw=0.6, color=_RED, label=believed)
+        end = time[-1] + 5
+    ax.set_xlabel("time, ms, one release behind the other")
+    ax.set_ylabel("way of the release, °")
+    _legend_above(ax)
+
+
+def _rides(ax: Axes, rides: Sequence[Rode]) -> None:
+    """Draw the voltage that keeps the shaft at each rate, with two standard deviations, and as it is believed."""
+    import numpy as np
+
+    for number, rode in enumerate(rides):
+        rate, way = np.degrees(abs(rode.rate_rad_s)), rode.rate_rad_s < 0
+        label = {True: "backwards, seen", False: "seen"}[way]
+        first = all((other.rate_rad_s < 0) != way for other in rides[:number])
+        colour = _RED if way else _BLUE
+        ax.errorbar(
+            rate,
+            rode.seen_v,
+            2 * rode.deviation_v,
+            fmt="o",
+            ms=2.5,
+            lw=0.8,
+            color=colour,
+            label=label if first else None,
+        )
+    for way in (False, True):
+        line = [
+            (np.degrees(abs(rode.rate_rad_s)), rode.believed_v)
+            for rode in rides
+            if (rode.rate_rad_s < 0) == way and rode.believed_v is not None
+        ]
+        if line:
+            ax.plot(*zip(*sorted(line), strict=True), lw=0.6, color="0.2", label=None if way else "believed")
+    ax.set_xlabel("rate, °/s")
+    ax.set_ylabel("voltage at that rate, V")
+    ax.margins(0.05)
+    if rides:
+        _legend_above(ax)
 
 
 @_styled

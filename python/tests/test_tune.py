@@ -1,6 +1,7 @@
 """Identification and tuning from Python: the command's figures, refusals, pictures."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -44,6 +45,18 @@ def test_identification_is_the_commands_and_holds_the_truth(rig):
     assert "[bounds]" in rig.to_toml()
 
 
+def test_what_was_seen_stands_beside_what_is_believed(rig):
+    count = 2 * math.pi / 20_000
+    assert len(rig.falls) == rig.releases
+    for fell in rig.falls:
+        rest = [believed - seen for seen, believed in zip(fell.seen_rad, fell.believed_rad, strict=True)]
+        # A whole count is there, or less than one farther.
+        assert -0.1 * count < min(rest) and max(rest) < 1.1 * count, fell
+    assert tuple(rode.rate_rad_s for rode in rig.rides) == rig.rides_rad_s
+    for rode in rig.rides:
+        assert abs(rode.seen_v - rode.believed_v) < 3 * rode.deviation_v, rode
+
+
 def test_a_motor_axis_is_identified_within_its_limits():
     axis = clutch.identify("motor_pid", overrides={"rig.base": "bench"})
     told = axis.parameters
@@ -52,7 +65,8 @@ def test_a_motor_axis_is_identified_within_its_limits():
     assert told["break_backwards_v"].value == pytest.approx(1.0, rel=0.04)
     assert told["slide_forwards_v"].holds(0.6) and told["load_v"].holds(0.0) and axis.hops > 10 and axis.releases == 0
     assert "known torque" in axis.refused["each"] and "[model.actuator.motor]" in axis.to_toml()
-    left, right = axis.plot().axes
+    # No releases: intervals beside rides and map.
+    left, _, right = axis.plot().axes
     assert len(left.get_yticklabels()) == len(told) and len(right.lines) == 1
     with pytest.raises(ValueError, match="travel_deg = 3 °: expected 10 to 3600 °"):
         clutch.identify("motor_pid", travel_deg=3)
@@ -145,7 +159,8 @@ def test_what_is_given_out_slides_is_proven_and_runs(tuned, tmp_path):
 
 
 def test_pictures_have_what_they_say(rig, tuned):
-    left, right = rig.plot().axes
+    falls, rides, left, right = rig.plot().axes
+    assert len(falls.lines) == 2 * rig.releases and len(rides.containers) == len(rig.rides)
     assert len(left.get_yticklabels()) == len(rig.parameters) and len(right.lines) == 1
     lines = printed("identify", "board_smc_2").splitlines()
     for label in left.get_yticklabels():

@@ -436,7 +436,7 @@ fn smooth() -> Result<()> {
     cargo(["run", "--release", "--package", "clutch-cli", "--example", "laws_figure", "--"])
         .args([cells, "docs/figures/smooth.svg"])
         .run()?;
-    for table in ["plants", "rest", "troubles", "steps", "motions", "motor", "bristles"] {
+    for table in ["plants", "loops", "rest", "troubles", "steps", "motions", "motor", "bristles"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
     for table in ["identified", "maps"] {

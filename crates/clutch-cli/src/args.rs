@@ -57,6 +57,25 @@ impl ScenarioArgs {
         Ok(scenario)
     }
 
+    /// Refuses a scenario whose certificate reckons with another delay or lag than the rig file has.
+    pub(crate) fn expect_times_found(&self, scenario: &Scenario) -> anyhow::Result<()> {
+        let Some(rig) = self.identified.as_deref().map(read_rig_file).transpose()? else { return Ok(()) };
+        rig.other_times(scenario).first().map_or(Ok(()), |other| Err(other.refusal(scenario.name()).into()))
+    }
+
+    /// Remarks a delay or lag that the scenario's rig or its filter has otherwise than the rig file.
+    pub(crate) fn remark_other_times(&self, scenario: &Scenario) -> anyhow::Result<()> {
+        let Some(rig) = self.identified.as_deref().map(read_rig_file).transpose()? else { return Ok(()) };
+        let (of_rig, believed) = (rig.other_times(scenario), rig.otherwise_believed(scenario));
+        for (others, effect) in [(of_rig, "rig and certificate are"), (believed, "the filter believes it")] {
+            for other in others {
+                let why = format!("note: {} = {}: expected {}", other.key, other.value, other.expected);
+                remark(&paragraph(&format!("{why}; {effect} as the scenario says")));
+            }
+        }
+        Ok(())
+    }
+
     /// Remarks a map that was given to a law which takes none.
     pub(crate) fn remark_unused_map(&self, scenario: &Scenario) {
         let law = scenario.spec().law;

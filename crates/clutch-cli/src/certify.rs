@@ -53,6 +53,11 @@ impl Certify {
         let save = self.save;
         check_files(&save)?;
         let scenario = self.scenario.load()?;
+        // Nothing that is proven in continuous time asks for a delay.
+        if !matches!(asked, Asked::Nothing) {
+            self.scenario.expect_times_found(&scenario)?;
+        }
+        self.scenario.remark_other_times(&scenario)?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let rig =

@@ -40,6 +40,10 @@ impl CompiledArgs {
     pub(crate) fn load(&self) -> anyhow::Result<Option<Compiled>> {
         let file = self.scenario.scenario.display();
         let scenario = self.scenario.load()?;
+        if !self.uncertified {
+            self.scenario.expect_times_found(&scenario)?;
+        }
+        self.scenario.remark_other_times(&scenario)?;
         let cleared = match check(&scenario, self.certificate.as_deref(), self.uncertified, None) {
             Ok(cleared) => cleared,
             Err(ClearanceError::NotCertified { lack, .. }) => {

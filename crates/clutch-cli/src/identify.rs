@@ -12,6 +12,7 @@ use clap::Args;
 use clutch_identify::added::{Added, Separate};
 use clutch_identify::experiment::{ExperimentError, FASTEST_DEG_S, PartRunner, folder_for_logs};
 use clutch_identify::recording::{MOST_TABLE_MIB, Scale};
+use clutch_identify::seen::{Fell, Rode, Seen};
 use clutch_identify::{
     Consent, Experiment, Finding, Identified, Recording, map_as_believed, map_file, motor,
 };
@@ -369,6 +370,27 @@ fn finding(finding: &Finding) -> Value {
     }
 }
 
+/// Releases and rides beside what is believed of them.
+fn seen(seen: &Seen) -> Value {
+    let fell = |fell: &Fell| {
+        value!({
+            "recording": fell.place.0,
+            "tick": fell.place.1,
+            "period_s": fell.period,
+            "seen_rad": fell.seen,
+            "believed_rad": fell.believed,
+        })
+    };
+    let rode = |rode: &Rode| {
+        let (volts, deviation) = rode.seen;
+        value!({ "rate_rad_s": rode.rate, "seen_v": volts, "deviation_v": deviation, "believed_v": rode.believed })
+    };
+    value!({
+        "falls": seen.falls.iter().map(fell).collect::<Vec<_>>(),
+        "rides": seen.rides.iter().map(rode).collect::<Vec<_>>(),
+    })
+}
+
 /// The result as `--json` prints it.
 #[must_use]
 pub fn object(report: &Identified, separate: Option<&Separate>) -> Value {
@@ -386,6 +408,7 @@ pub fn object(report: &Identified, separate: Option<&Separate>) -> Value {
         "parameters": parameters,
         "ripple_waves_per_turn": report.waves(),
         "unexplained": report.unexplained(),
+        "seen": seen(report.seen()),
         "map": report.map().iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
     });
     if let Some(separate) = separate {

@@ -29,10 +29,10 @@ pub(crate) struct Map {
     /// The key across and its values: LOW:HIGH:NUMBER, evenly spaced in ratio from LOW above 0, else in difference, or a
     /// list; unless given, the law's first gain from a quarter to four times its value.
     #[arg(long, value_name = "KEY=VALUES", value_parser = axis)]
-    x: Option<Axis>,
+    x: Option<Asked>,
     /// The key down and its values; with neither --x nor --y the law's second gain.
     #[arg(long, value_name = "KEY=VALUES", value_parser = axis, requires = "x")]
-    y: Option<Axis>,
+    y: Option<Asked>,
     /// Rates that are tried, °/s, as LOW:HIGH:NUMBER or a list.
     #[arg(long, value_name = "VALUES", value_parser = values)]
     rates: Option<List>,
@@ -93,9 +93,29 @@ pub(crate) fn values(text: &str) -> Result<List, String> {
     Ok(List(list))
 }
 
-fn axis(text: &str) -> Result<Axis, String> {
+/// An axis as it is given.
+#[derive(Clone)]
+struct Asked {
+    axis: Axis,
+    /// Made from LOW:HIGH:NUMBER.
+    spread: bool,
+}
+
+impl Asked {
+    /// A key that takes whole numbers has those of a range, each once.
+    fn of(mut self, scenario: &Scenario) -> Axis {
+        if self.spread && scenario.takes_whole(&self.axis.key) {
+            self.axis.values.iter_mut().for_each(|x| *x = x.round());
+            self.axis.values.dedup();
+        }
+        self.axis
+    }
+}
+
+fn axis(text: &str) -> Result<Asked, String> {
     let (key, list) = text.split_once('=').ok_or("expected KEY=VALUES, as law.pd.kp_v_rad=500:5000:8")?;
-    Ok(Axis { key: key.trim().to_owned(), values: values(list)?.0 })
+    let axis = Axis { key: key.trim().to_owned(), values: values(list)?.0 };
+    Ok(Asked { axis, spread: list.contains(':') })
 }
 
 /// The law's first two gains, each from a quarter to four times its value.
@@ -131,7 +151,8 @@ impl Map {
         let rates = self.rates.as_ref().map_or(&RATES_DEG_S[..], |list| &list.0);
         let trials = Trials::new(&origin, rates, self.discs.into())?.above(self.discs_above);
         let found = with_progress("cells", |progress| -> anyhow::Result<Found> {
-            Ok(match (self.x, self.y) {
+            let of = |asked: Asked| asked.of(&scenario);
+            Ok(match (self.x.map(of), self.y.map(of)) {
                 (Some(x), None) => Found::Rates(rate_map(&scenario, x, &trials, progress)?),
                 (Some(x), Some(y)) => Found::Gains(gain_map(&scenario, (x, y), &trials, progress)?),
                 (None, _) => Found::Gains(gain_map(&scenario, own_axes(&scenario)?, &trials, progress)?),

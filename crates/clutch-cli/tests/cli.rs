@@ -915,6 +915,38 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     let ends = [inertia[0].as_f64(), inertia[1].as_f64()].map(Option::unwrap);
     assert!(ends[0] < truth && truth < ends[1] && ends[1] / ends[0] < 1.03, "{truth}: {inertia}");
 
+    // What was found of a delay is that of the certificate, or nothing is certified.
+    let found: toml::Table = std::fs::read_to_string(&rig).unwrap().parse().unwrap();
+    let with_a_delay = |from: f64, to: f64| {
+        let mut file = found.clone();
+        let of = file["identified"]["delay_s"].as_table_mut().unwrap();
+        for (key, value) in [("low", from), ("value", 0.5 * (from + to)), ("high", to)] {
+            of.insert(key.to_owned(), toml::Value::Float(value));
+        }
+        let written = path("delayed.toml");
+        std::fs::write(&written, file.to_string()).unwrap();
+        written
+    };
+    let delayed = with_a_delay(0.00095, 0.00109);
+    let unfolded = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let refusal = "rig.delay_ticks = 0: expected 1: the rig file has a delay of 0.95 to 1.09 ms";
+    for verb in [&["certify", "--sampled"][..], &["loop"]] {
+        let o = clutch(&[verb, &["board_smc_2", "--identified", &delayed], &hold].concat());
+        assert_eq!(o.status.code(), Some(1), "{}", out(&o));
+        assert!(unfolded(&err(&o)).contains(refusal), "{}", err(&o));
+    }
+    let none = ["--set", "rig.delay_ticks=0", "--set", "law.glide.filter.delay_ticks=0"];
+    let o = clutch(&[&["sim", "bench_glide_2", "--identified", &delayed][..], &none].concat());
+    let told = unfolded(&err(&o));
+    assert!(o.status.success() && told.contains(refusal), "{told}");
+    assert!(told.contains("law.glide.filter.delay_ticks = 0: expected 1"), "{told}");
+    let one = [&hold[..], &["--set", "rig.delay_ticks=1"]].concat();
+    let o = clutch(&[&["certify", "board_smc_2", "--sampled", "--identified", &delayed], &one[..]].concat());
+    assert!(out(&o).contains("1 tick of delay") && !err(&o).contains("rig file"), "{}", err(&o));
+    let between = with_a_delay(0.0012, 0.0014);
+    let o = clutch(&[&["certify", "board_smc_2", "--sampled", "--identified", &between], &one[..]].concat());
+    assert!(unfolded(&err(&o)).contains("which is no whole number of periods"), "{}", err(&o));
+
     // The logs give the same, and one of them what it can.
     let o = clutch(&["identify", "--json", "--from", &format!("{logs}/releases.mcap")]);
     let told: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");

@@ -5,7 +5,7 @@
 
 use clutch_identify::experiment::{PartRunner, Programme, experiment};
 use clutch_identify::rig_file::rig_file;
-use clutch_identify::{Report, RigFile, identify};
+use clutch_identify::{Estimate, Report, RigFile, identify};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::run::{Keep, simulate_watched};
 use clutch_sim::scenario::{Table, Value};
@@ -42,9 +42,11 @@ fn told(scenario: &Scenario, report: &Report) -> Outcome<Scenario> {
         let _ = table.remove(bounded);
     }
     let period: f64 = scenario.spec().period.seconds();
-    let delay = file.delay.ok_or("no delay was told")?;
+    let lag = file.lag.map_or(0.0, Estimate::if_any);
+    let delay = file.delay.ok_or("no delay was told")?.less(lag);
     let ticks = (delay.value / period).round() as i64;
-    let set = [("law.glide.filter.delay_ticks".to_owned(), Value::Integer(ticks))];
+    let keys = ["delay_ticks", "lag_s"].map(|key| format!("law.glide.filter.{key}"));
+    let set: Vec<_> = keys.into_iter().zip([Value::Integer(ticks), Value::Float(lag)]).collect();
     Ok(Scenario::from_table("identified", table, &set)?)
 }
 

@@ -10,6 +10,7 @@ use clutch_sim::progress::UNWATCHED;
 use clutch_sim::rig::Rig;
 use clutch_sim::run::{Keep, Run, simulate_watched};
 use std::error::Error;
+use std::f64::consts::TAU;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -51,6 +52,15 @@ fn learnt(seed: u64, (rate, way): (f64, f64)) -> Outcome<Vec<Place>> {
     Ok(map_as_believed(&[recording], &scenario))
 }
 
+/// The disc's own friction, a point each 5000th of a turn, from before the beginning of both rides to behind their end.
+fn exact(seed: u64) -> Outcome<Vec<Place>> {
+    let rig = Rig::new(&scenario(seed, 2.0, "", "")?.spec().rig, seed)?;
+    let ripple = rig.model.ripple.as_ref().ok_or("an even disc")?;
+    let step = TAU / 5000.0;
+    let angles = (-70..300).map(|i| f64::from(i) * step);
+    Ok(angles.map(|angle| Place { angle, factor: ripple.factor(angle) }).collect())
+}
+
 /// Root mean square of a map's error, as a share of friction, its mean apart.
 fn error_of(map: &[Place], seed: u64) -> Outcome<f64> {
     let rig = Rig::new(&scenario(seed, 2.0, "", "")?.spec().rig, seed)?;
@@ -63,7 +73,8 @@ fn error_of(map: &[Place], seed: u64) -> Outcome<f64> {
 
 /// A row: a second ride on each disc, with the maps given.
 fn print_row(title: &str, rate: f64, maps: &[Option<&[Place]>]) -> Outcome<()> {
-    let (mut cycles, mut discs, mut error, mut rms, mut travel, mut first) = (0.0, 0, 0.0_f64, 0.0, 0.0, 0);
+    let (mut cycles, mut discs, mut error, mut square, mut travel, mut first) =
+        (0.0, 0, 0.0_f64, 0.0, 0.0, 0);
     let (mut dropped, mut drove, mut kept) = (Vec::new(), 0.0, 0);
     for (seed, map) in DISCS.zip(maps) {
         let file = map.map_or_else(String::new, |map| map_file(map, "bench"));
@@ -73,7 +84,7 @@ fn print_row(title: &str, rate: f64, maps: &[Option<&[Place]>]) -> Outcome<()> {
         cycles += m.stick_slip_cycles_per_s;
         discs += usize::from(m.stick_slip_cycles_per_s > 0.0);
         error = error.max(m.max_error_rad.to_degrees());
-        rms += m.rms_error_rad.to_degrees();
+        square += m.rms_error_rad.powi(2);
         travel += m.control_variation_v_s;
         first += run.events.iter().filter(|e| e.time < 1.0 && e.kind == EventKind::Stick).count();
         let (_, part) = run.trace.terms.iter().find(|(name, _)| *name == "map").ok_or("no term map")?;
@@ -100,7 +111,7 @@ fn print_row(title: &str, rate: f64, maps: &[Option<&[Place]>]) -> Outcome<()> {
     println!(
         "| {title} | {:.3} | {discs} | {error:.4}° | {:.4}° | {:.0} | {:.2} | {drives} | {gone} |",
         cycles / n,
-        rms / n,
+        (square / n).sqrt().to_degrees(),
         travel / n,
         first as f64 / n
     );
@@ -127,6 +138,9 @@ fn main() -> Outcome<()> {
             let of: Vec<_> = maps.iter().map(|map| Some(&map[..])).collect();
             print_row(&format!("{rate} °/s, of a ride at {at} °/s over {way}°"), rate, &of)?;
         }
+        let own = DISCS.map(exact).collect::<Outcome<Vec<_>>>()?;
+        let own: Vec<_> = own.iter().map(|map| Some(&map[..])).collect();
+        print_row(&format!("{rate} °/s, the disc's own friction, exactly"), rate, &own)?;
         let (_, maps) = &learnt_at[0];
         let others: Vec<_> = (0..maps.len()).map(|i| Some(&maps[(i + 1) % maps.len()][..])).collect();
         print_row(&format!("{rate} °/s, of another disc"), rate, &others)?;

@@ -7,6 +7,7 @@ use crate::recording::{ReadError, Recording};
 use crate::report::{self, Finding, Report};
 use crate::ride::Place;
 use crate::rig_file::{self, Lacks};
+use crate::seen::Seen;
 use crate::shown::{MOTOR_ROWS, ROWS, Row};
 use clutch_core::ActuatorKind;
 use clutch_sim::Scenario;
@@ -169,6 +170,15 @@ impl Identified {
         match self {
             Identified::Brake(report) => &report.found,
             Identified::Motor(report) => &report.found,
+        }
+    }
+
+    /// Releases and rides beside what is believed of them.
+    #[must_use]
+    pub fn seen(&self) -> &Seen {
+        match self {
+            Identified::Brake(report) => &report.seen,
+            Identified::Motor(report) => &report.seen,
         }
     }
 

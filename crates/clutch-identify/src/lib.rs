@@ -17,7 +17,9 @@ pub mod release;
 pub mod report;
 pub mod ride;
 pub mod rig_file;
+pub mod seen;
 pub mod shown;
+pub mod times;
 pub mod unlike;
 
 pub use believed::{Believed, Corner, believed};

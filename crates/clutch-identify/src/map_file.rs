@@ -1,11 +1,13 @@
 //! Friction along the disc, from a ride to `[friction_map]` of a scenario.
 
+use crate::motor;
 use crate::recording::{Recording, at_pad};
 use crate::ride::{Place, rides, waves};
+use clutch_core::Actuator;
 use clutch_sim::Scenario;
 
-/// Friction along the disc where the slowest ride of the recordings went, with T/J and delay as the scenario believes them to
-/// be: for recordings without releases, which would determine both. Empty without a ride.
+/// Friction along the disc where the slowest ride of the recordings went, with T/J – of a motor K/J – and delay as the scenario believes
+/// them to be: for recordings without releases or hops, which would determine both. Empty without a ride.
 #[must_use]
 pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Place> {
     let spec = scenario.spec();
@@ -15,6 +17,10 @@ pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Pla
         None => (spec.rig.delay_ticks, spec.rig.actuator_time_constant.unwrap_or(0.0)),
     };
     let delay = f64::from(ticks) * period;
+    if recordings.first().is_some_and(|recording| recording.motor) {
+        let gain = Actuator::new(&spec.model.actuator).map_or(0.0, |motor| motor.motor_gain());
+        return motor::map_as_believed(recordings, gain / spec.model.inertia, delay);
+    }
     let pull = (spec.model.drive_torque / spec.model.inertia).abs();
     let seen = at_pad(recordings, lag);
     let slowest = seen.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));

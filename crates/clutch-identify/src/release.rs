@@ -15,6 +15,7 @@
 use crate::Estimate;
 use crate::lag::{self, LagLine, Late};
 use crate::recording::Recording;
+use crate::seen::Fell;
 
 /// Shortest release that shows something, periods.
 const SHORTEST: usize = 8;
@@ -73,6 +74,20 @@ impl Fall {
     #[must_use]
     pub fn dead_time(&self) -> f64 {
         self.delay.less(self.lags()).value
+    }
+
+    /// Releases beside this fall, with C/J as known, 1/s. Where one delay does not explain them all, each has its own.
+    #[must_use]
+    pub fn beside(&self, releases: &[Release], damping: Estimate) -> Vec<Fell> {
+        let slack = self.looser.unwrap_or(SLACK * coarser(releases));
+        let with = (slack, self.lags());
+        let shape = Shape { damping: damping.value, lag: self.lags(), slack };
+        let of = |release: &Release| {
+            let own = || release.delay(&self.pull, (damping.low, damping.high), with);
+            let one = self.looser.is_none() && self.lags() <= 0.0;
+            Some(release.beside(self.pull.value, if one { self.delay.value } else { own()? }, shape))
+        };
+        releases.iter().filter_map(of).collect()
     }
 }
 
@@ -169,6 +184,38 @@ impl Release {
     /// `true` if the shaft falls so far that its delay shows.
     fn falls(&self) -> bool {
         self.counts.last().is_some_and(|way| *way >= FEWEST_COUNTS)
+    }
+
+    /// The delay with which a T/J explains it, s: the middle of its set.
+    fn delay(&self, pull: &Estimate, dampings: (f64, f64), (slack, lag): (f64, f64)) -> Option<f64> {
+        let explains = |delay: &f64| {
+            (0..DAMPINGS).any(|k| {
+                let shape = Shape { damping: between(dampings, k), lag, slack };
+                self.narrow(*delay, shape, &mut (pull.low, pull.high)).is_ok()
+            })
+        };
+        let ends = delays(self.units.0).filter(explains).fold(None, |ends: Option<(f64, f64)>, delay| {
+            Some(ends.map_or((delay, delay), |(soonest, _)| (soonest, delay)))
+        });
+        ends.map(|(soonest, latest)| 0.5 * (soonest + latest))
+    }
+
+    /// Its way beside a fall's.
+    fn beside(&self, pull: f64, delay: f64, shape: Shape) -> Fell {
+        let (period, count) = self.units;
+        let fall = |i: usize| pull * shape.fall((i as f64 * period - delay).max(0.0));
+        let falls: Vec<f64> = (0..self.counts.len()).map(fall).collect();
+        // The place within a count that goes with most of them.
+        let rest = falls.iter().zip(&self.counts).map(|(fall, n)| n * count - fall);
+        let (least, most) =
+            rest.fold((f64::INFINITY, f64::NEG_INFINITY), |ends, x| (ends.0.min(x), ends.1.max(x)));
+        let start = 0.5 * (least + most + count);
+        Fell {
+            place: self.place.clone(),
+            period,
+            seen: self.counts.iter().map(|n| n * count).collect(),
+            believed: falls.iter().map(|fall| start + fall).collect(),
+        }
     }
 
     /// Narrows bounds of T/J (rad/s²); the index of the sample at which nothing was left.
@@ -273,12 +320,13 @@ fn with_own_pulls(releases: &[Release], dampings: (f64, f64), slack: f64, own_de
     let all = (0..DAMPINGS).map(|k| between(dampings, k));
     let found: Vec<(f64, f64)> = if own_delays {
         let union = |release: &Release, damping: f64| {
-            let each = delays(releases).filter_map(|delay| bounds(release, delay, damping));
+            let each = delays(release.units.0).filter_map(|delay| bounds(release, delay, damping));
             each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
         };
         all.filter_map(|damping| apart(&|release| union(release, damping))).collect()
     } else {
-        let grid = all.flat_map(|damping| delays(releases).map(move |delay| (delay, damping)));
+        let period = releases.first().map_or(1e-3, |r| r.units.0);
+        let grid = all.flat_map(|damping| delays(period).map(move |delay| (delay, damping)));
         grid.filter_map(|(delay, damping)| apart(&|release| bounds(release, delay, damping))).collect()
     };
     let closest = found.into_iter().min_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
@@ -290,8 +338,9 @@ fn between((least, most): (f64, f64), k: usize) -> f64 {
     least + (most - least) * k as f64 / (DAMPINGS - 1) as f64
 }
 
-fn delays(releases: &[Release]) -> impl Iterator<Item = f64> + Clone {
-    let step = DELAY_STEP * releases.first().map_or(1e-3, |r| r.units.0);
+/// Delays that are tried, s.
+fn delays(period: f64) -> impl Iterator<Item = f64> + Clone {
+    let step = DELAY_STEP * period;
     (0..=(LONGEST_DELAY / DELAY_STEP) as usize).map(move |k| k as f64 * step)
 }
 
@@ -328,21 +377,11 @@ fn with_a_lag(releases: &[Release], dampings: (f64, f64), slack: f64) -> Option<
     })
 }
 
-/// Of each release the voltage before it and the delay with which a T/J explains it: the middle of its set.
-fn late(releases: &[Release], pull: &Estimate, dampings: (f64, f64), (slack, lag): (f64, f64)) -> Vec<Late> {
+/// Of each release the voltage before it and its delay; `with`: the slack and the lag.
+fn late(releases: &[Release], pull: &Estimate, dampings: (f64, f64), with: (f64, f64)) -> Vec<Late> {
     let of = |release: &Release| {
-        let explains = |delay: &f64| {
-            (0..DAMPINGS).any(|k| {
-                let shape = Shape { damping: between(dampings, k), lag, slack };
-                release.narrow(*delay, shape, &mut (pull.low, pull.high)).is_ok()
-            })
-        };
-        let ends = delays(releases).filter(explains).fold(None, |ends: Option<(f64, f64)>, delay| {
-            Some(ends.map_or((delay, delay), |(soonest, _)| (soonest, delay)))
-        });
-        let (soonest, latest) = ends?;
-        (release.falls() && release.before > 0.0)
-            .then(|| (libm::log(release.before), 0.5 * (soonest + latest)))
+        let delay = release.delay(pull, dampings, with)?;
+        (release.falls() && release.before > 0.0).then(|| (libm::log(release.before), delay))
     };
     releases.iter().filter_map(of).collect()
 }
@@ -355,7 +394,7 @@ fn with_own_delays(releases: &[Release], dampings: (f64, f64), (slack, lag): (f6
         let mut ends = (f64::INFINITY, 0.0_f64);
         for release in releases {
             let mut own = (f64::INFINITY, 0.0_f64);
-            for delay in delays(releases) {
+            for delay in delays(release.units.0) {
                 let mut bounds = (0.0, f64::INFINITY);
                 if release.narrow(delay, Shape { damping, lag, slack }, &mut bounds).is_ok() {
                     own = (own.0.min(bounds.0), own.1.max(bounds.1));
@@ -387,7 +426,7 @@ fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Un
     let mut longest = (0, 0, 0);
     let period = releases.first().map_or(1e-3, |r| r.units.0);
     let slack = SLACK * coarser(releases);
-    for delay in delays(releases) {
+    for delay in delays(period) {
         for k in 0..DAMPINGS {
             let damping = between(dampings, k);
             let mut bounds = (0.0, f64::INFINITY);

@@ -5,6 +5,7 @@ use crate::confidence::{DEVIATIONS, FALL};
 use crate::recording::{Recording, at_pad};
 use crate::release::{self, Fall, Release, Unexplained};
 use crate::ride::{Place, Ride, Told, rides, uneven, waves};
+use crate::seen::{Rode, Seen};
 use crate::{DAMPINGS, Estimate, unlike};
 use serde::Serialize;
 
@@ -14,7 +15,8 @@ const RATES_APART: f64 = 0.5;
 const FEWEST_SLIPS: usize = 3;
 /// Share by which μ_s/μ_d may be off on an even disc, where steps of the converter say as much as friction.
 const EVEN: f64 = 0.02;
-/// Most releases and break-aways that are looked at: a minute of an experiment has fewer.
+/// Most releases and break-aways that are looked at: a minute of an experiment has fewer. Of more, those of several experiments, some
+/// from each.
 const MOST: usize = 60;
 /// Share of its rate below which a shaft nearly stops.
 const STOPS: f64 = 0.2;
@@ -89,17 +91,27 @@ pub struct Report {
     pub unexplained: Vec<String>,
     /// Releases, break-aways, and rates of the rides (rad/s) that were found.
     pub found: (usize, usize, Vec<f64>),
+    /// Releases and rides beside what is believed.
+    #[serde(skip)]
+    pub seen: Seen,
+}
+
+/// So many of a list at most, spread evenly over it.
+fn at_most<T>(most: usize, all: Vec<T>) -> Vec<T> {
+    let of = all.len();
+    let taken = |i: usize| of <= most || i * most / of != (i + 1) * most / of;
+    all.into_iter().enumerate().filter(|(i, _)| taken(*i)).map(|(_, one)| one).collect()
 }
 
 /// Identifies a shaft from recordings of it.
 #[must_use]
 pub fn identify(recordings: &[Recording]) -> Report {
-    let releases: Vec<Release> = recordings.iter().flat_map(release::releases).take(MOST).collect();
-    let breaks_away = mean_volts(&recordings.iter().flat_map(break_aways).take(MOST).collect::<Vec<_>>());
+    let releases: Vec<Release> = at_most(MOST, recordings.iter().flat_map(release::releases).collect());
+    let breaks_away = mean_volts(&at_most(MOST, recordings.iter().flat_map(break_aways).collect()));
     let fall = (!releases.is_empty()).then(|| release::fall(&releases, DAMPINGS, breaks_away));
     let lag = fall.as_ref().and_then(|fall| fall.as_ref().ok()).map_or(0.0, Fall::lags);
     let seen = at_pad(recordings, lag);
-    let slips: Vec<BreakAway<'_>> = seen.iter().flat_map(break_aways).take(MOST).collect();
+    let slips: Vec<BreakAway<'_>> = at_most(MOST, seen.iter().flat_map(break_aways).collect());
     let rides: Vec<Ride<'_>> = seen.iter().flat_map(rides).collect();
     let counted = (releases.len(), slips.len());
     let stretches = seen.iter().flat_map(uneven).collect::<Vec<_>>();
@@ -133,6 +145,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
         ),
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
         uneven: slowest.map_or(0.0, |slow| slow.uneven),
+        seen: motion.seen(&releases),
         unexplained: motion.unexplained,
         found: (counted.0, counted.1, motion.rates),
     }
@@ -268,6 +281,19 @@ impl Motion {
             (None, Some(cause)) => refused(cause),
             (None, None) => refused(two),
         }
+    }
+
+    /// Releases and rides, beside what is believed.
+    fn seen(&self, releases: &[Release]) -> Seen {
+        let any = Estimate { value: 0.0, low: DAMPINGS.0, high: DAMPINGS.1 };
+        let damping = self.damping.unwrap_or(any);
+        let falls = self.fall.as_ref().map_or_else(Vec::new, |fall| fall.beside(releases, damping));
+        let believed = |rate: f64| {
+            let drag = damping.value * rate / self.fall.as_ref()?.pull.value;
+            Some(self.hold?.value * (1.0 - drag))
+        };
+        let rode = |t: &Told| Rode { rate: t.rate, seen: t.hold, believed: believed(t.rate) };
+        Seen { falls, rides: self.told.iter().map(rode).collect() }
     }
 
     /// A finding of the releases.

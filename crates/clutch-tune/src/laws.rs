@@ -3,7 +3,7 @@
 use crate::proof::typed;
 use clutch_core::edge_timed::{EdgeTimedParams, waves_seen};
 use clutch_core::friction::FrictionModel as _;
-use clutch_core::law::LawParams;
+use clutch_core::law::{GlideParams, LawParams};
 use clutch_core::params::Choice;
 use clutch_core::{ActuatorKind, Plant};
 use clutch_sim::ripple::RippleParams;
@@ -40,7 +40,7 @@ enum Told {
     Damping,
     /// Voltage over acceleration for the inertia, V s²/rad.
     Inertia,
-    /// Rate below which micro-steps are taken, °/s.
+    /// Rate below which micro-steps are taken, °/s, if the lag lets them.
     Steps,
     /// Waves of the ripple at the middle of its band, or the most that the encoder sees, where they are not near the default's.
     Waves,
@@ -247,6 +247,13 @@ impl Told {
                 (waves != unseen).then_some(Value::Float(waves))?
             }
             Told::Delay => Value::Integer(rig.delay_ticks.min(3).into()),
+            Told::Steps
+                if rig
+                    .actuator_time_constant
+                    .is_some_and(|lag| lag > GlideParams::<f64>::MOST_LAG_OF_STEPS) =>
+            {
+                return None;
+            }
             Told::Steps => {
                 Value::Float(STEPS_BELOW * 20_000.0 / f64::from(rig.encoder.sensor.counts_per_rev))
             }

@@ -46,7 +46,15 @@ crate::params! {
         /// A shaft at the floor is not taken to rest.
         SEEN_AT_FLOOR: floor, "a share above 1/filter.silence_counts, so that a shaft at the floor is not taken to rest" =>
             p.floor * p.filter.silence > T::ONE;
+        /// A brake that lags lets go for too long.
+        STEPS_ARE_SMALL: micro, "0 with a filter.lag_s above 0.0005 s, under which micro-steps are no longer small" =>
+            p.micro == T::ZERO || p.filter.lag <= T::from_f64(Self::MOST_LAG_OF_STEPS);
     }
+}
+
+impl<T> GlideParams<T> {
+    /// Longest lag of an actuator under which micro-steps are taken, s: with 0.5 ms they have 0.012°, with 3 ms 0.069°.
+    pub const MOST_LAG_OF_STEPS: f64 = 5e-4;
 }
 
 /// The law, checked.
@@ -369,6 +377,19 @@ mod tests {
         // 2.24 V with the model's friction, a standard deviation of 29 % fewer.
         assert!(after.voltage > 1.2 && after.voltage < 1.9, "{} V", after.voltage);
         assert_eq!(after.terms[5], 1.0, "started");
+    }
+
+    #[test]
+    fn micro_steps_are_refused_beside_a_lag_that_makes_them_long() {
+        let with = |lag: f64, micro: f64| {
+            let filter = EdgeTimedParams { lag, ..EdgeTimedParams::default() };
+            let p = GlideParams { micro, filter, ..GlideParams::default() };
+            let model = PlantParams::default();
+            Glide::new(&p, &Beside::paper(&model, &OutputParams::default())).map(|_| ()).map_err(|e| e.field())
+        };
+        assert_eq!(with(5e-4, 0.016), Ok(()));
+        assert_eq!(with(5.1e-4, 0.0), Ok(()));
+        assert_eq!(with(5.1e-4, 0.016), Err("micro"));
     }
 
     #[test]

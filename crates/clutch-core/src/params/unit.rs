@@ -49,6 +49,15 @@ impl Unit {
         }
     }
 
+    /// From SI to this unit, for a number that people are shown.
+    #[must_use]
+    pub const fn factor(&self) -> f64 {
+        match self.conversion {
+            Conversion::None => 1.0 / self.size,
+            Conversion::Degrees | Conversion::Percent => self.from_si(1.0),
+        }
+    }
+
     /// The unit with which a key or a column ends; the longest that fits.
     #[must_use]
     pub fn of_key(key: &str) -> Option<&'static Unit> {
@@ -132,6 +141,7 @@ units! {
     RAD_S3 "rad_s3" "rad/s³" "rad/s³" None "jerk" 1.0;
     RAD "rad" "rad" "rad" None "angle" 1.0;
     MS "ms" "ms" "ms" None "time" 1e-3;
+    MRAD_S "mrad_s" "mrad/s" "mrad/s" None "velocity" 1e-3;
     MV "mv" "mV" "mV" None "voltage" 1e-3;
     MNM "mnm" "mN m" "mN m" None "torque" 1e-3;
     MM "mm" "mm" "mm" None "length" 1e-3;

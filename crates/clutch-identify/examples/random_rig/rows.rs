@@ -21,6 +21,7 @@ impl As {
 
     fn shown(self, error: f64) -> String {
         match self {
+            _ if error.is_nan() => "–".to_owned(),
             As::Percent => format!("{error:.2} %"),
             As::Factor => format!("× {error:.2}"),
             As::Times(_, unit) => format!("{error:.3} {unit}").trim_end().to_owned(),

@@ -122,7 +122,7 @@ impl Pass {
     }
 
     /// Friction, V, over what it is on this stretch by the map of another pass, and its deviation.
-    fn friction(&self, map: &[Place]) -> (f64, f64) {
+    pub(crate) fn friction(&self, map: &[Place]) -> (f64, f64) {
         let (volts, deviation) = self.told.hold;
         match mean(map, self.stretch) {
             // Where it is slow, the way that friction takes to fall is a part of what the map does not know.
@@ -133,7 +133,7 @@ impl Pass {
     }
 
     /// `false` if it is slow, and nearly stops somewhere: friction there is of a velocity that edges do not show.
-    fn is_even(&self) -> bool {
+    pub(crate) fn is_even(&self) -> bool {
         if self.told.rate > SLOW {
             return true;
         }
@@ -147,6 +147,16 @@ impl Pass {
             return 0.0;
         }
         self.velocities.iter().map(|v| libm::exp(-v / velocity)).sum::<f64>() / self.velocities.len() as f64
+    }
+
+    /// Factors of a curve's numbers in its friction, with a Stribeck velocity, rad/s.
+    pub(crate) fn row(&self, velocity: f64) -> Numbers {
+        let left = self.left(velocity);
+        let mut row = Numbers::zeros();
+        row[self.way] = 1.0 - left;
+        row[2 + self.way] = left;
+        row[4] = self.told.rate;
+        row
     }
 }
 
@@ -178,12 +188,7 @@ impl Curve {
             // Passes at one rate go over the same places: together they show no more than one.
             let alike = |p: &&Pass| p.way == pass.way && (p.told.rate / pass.told.rate - 1.0).abs() < ALIKE;
             let deviation = deviation * (passes.iter().filter(alike).count() as f64).sqrt();
-            let left = pass.left(velocity);
-            let mut row = Numbers::zeros();
-            row[pass.way] = 1.0 - left;
-            row[2 + pass.way] = left;
-            row[4] = pass.told.rate;
-            rows.push((row, volts, deviation));
+            rows.push((pass.row(velocity), volts, deviation));
         }
         for way in [0, 1] {
             let sliding = reference(passes, way)?.told.hold.0;

@@ -9,6 +9,7 @@ use crate::profile::{Profile, spaced};
 use crate::recording::Recording;
 use crate::report::{Finding, refused};
 use crate::ride::Place;
+use crate::seen::{Rode, Seen};
 use serde::Serialize;
 
 /// Fewest break-aways one way, and the share by which the mean of their voltages is off for other reasons: the converter's
@@ -61,14 +62,16 @@ pub struct Report {
     pub unexplained: Vec<String>,
     /// Hops, break-aways, and rates of the passes (rad/s, backwards below 0) that were found.
     pub found: (usize, usize, Vec<f64>),
+    /// Passes beside what is believed, without Stribeck's fall.
+    #[serde(skip)]
+    pub seen: Seen,
 }
 
 /// Identifies a motor axis from recordings of it.
 #[must_use]
 pub fn identify(recordings: &[Recording]) -> Report {
     let all: Vec<Hop> = recordings.iter().flat_map(hops::hops).collect();
-    let views: [Vec<Recording>; 2] =
-        [recordings.to_vec(), recordings.iter().map(Recording::turned).collect()];
+    let views = views(recordings);
     let slips = views.each_ref().map(|view| {
         view.iter().enumerate().flat_map(|(i, r)| slips::slips(r).into_iter().map(move |s| (i, s))).collect()
     });
@@ -83,6 +86,11 @@ pub fn identify(recordings: &[Recording]) -> Report {
         known = better;
     }
     told.report(all.len())
+}
+
+/// The recordings as they are, and turned round.
+pub(super) fn views(recordings: &[Recording]) -> [Vec<Recording>; 2] {
+    [recordings.to_vec(), recordings.iter().map(Recording::turned).collect()]
 }
 
 /// Findings of hops and passes.
@@ -137,6 +145,21 @@ impl Motion {
             .collect();
         let (volts, deviation) = at_no_ramp(&volts)?;
         Some((volts, deviation.hypot(CLOCKWORK * volts)))
+    }
+
+    /// Even passes beside the curve, the slowest first.
+    fn seen(&self, fitted: &Fitted) -> Seen {
+        let of = |pass: &Pass| {
+            let map = &passes::reference(&self.passes, pass.way)?.told.map;
+            Some(Rode {
+                rate: pass.told.rate * [1.0, -1.0][pass.way],
+                seen: pass.friction(map),
+                believed: Some(pass.row(fitted.velocity).dot(&fitted.best.value)),
+            })
+        };
+        let mut rides: Vec<Rode> = self.passes.iter().filter(|pass| pass.is_even()).filter_map(of).collect();
+        rides.sort_by(|a, b| a.rate.abs().total_cmp(&b.rate.abs()).then(b.rate.total_cmp(&a.rate)));
+        Seen { falls: Vec::new(), rides }
     }
 
     fn report(self, hops: usize) -> Report {
@@ -209,6 +232,7 @@ impl Motion {
                 .filter(|p| p.told.rate >= passes::FINEST)
                 .filter_map(|p| crate::report::edge_off(&p.told))
                 .collect(),
+            seen: fitted.as_ref().map(|fitted| self.seen(fitted)).unwrap_or_default(),
             found: (hops, self.slips.iter().map(Vec::len).sum(), rates),
         }
     }
@@ -241,7 +265,8 @@ fn at_no_ramp(slips: &[(f64, f64)]) -> Option<(f64, f64)> {
 
 /// The curve of friction with the Stribeck velocities that go with it.
 struct Fitted {
-    /// At the most likely velocity, and all that are likely.
+    /// The most likely Stribeck velocity, rad/s, the curve with it, and all that are likely.
+    velocity: f64,
     best: Curve,
     likely: Vec<Curve>,
     stribeck: Finding,
@@ -258,7 +283,7 @@ impl Fitted {
         let (_, top) = profile.best();
         let likely: Vec<Curve> =
             curves.iter().filter(|(_, c)| log(c) >= top - FALL).map(|(_, c)| c.clone()).collect();
-        let best = curves.into_iter().map(|(_, c)| c).min_by(|a, b| a.misfit.total_cmp(&b.misfit))?;
+        let (velocity, best) = curves.into_iter().min_by(|a, b| a.1.misfit.total_cmp(&b.1.misfit))?;
         let (value, low, high) = profile.estimate(FALL);
         let falls =
             |way: usize| rest[way].is_some() && best.value[2 + way] > (1.0 + LEAST_FALL) * best.value[way];
@@ -273,7 +298,7 @@ impl Fitted {
                  below determine it",
             ),
         };
-        Some(Fitted { best, likely, stribeck })
+        Some(Fitted { velocity, best, likely, stribeck })
     }
 
     /// A number of the curve, `common` the share by which all frictions are off together.

@@ -33,6 +33,11 @@ macro_rules! pi {
 pub(super) const LAWS: &[Law] = &[
     Law { title: "glide", short: "glide", scenario: "[law.glide.filter]\ndelay_ticks = 1" },
     Law {
+        title: "glide, `f32`",
+        short: "glide, f32",
+        scenario: "[law.glide.filter]\ndelay_ticks = 1\n\n[sampling]\nscalar = \"f32\"",
+    },
+    Law {
         title: "PI with feed-forward, (5)",
         short: "PI, (5)",
         scenario: pi!("[velocity.smoothed_derivative]\nsmoothing = 0.67"),
@@ -114,9 +119,9 @@ pub(super) fn laws(file: Option<&str>) -> Outcome<()> {
         rows.push((law, found));
     }
     println!();
-    head("the same: V/s, share of time stuck");
+    head("the same: RMS error, V/s, share of time stuck");
     for (law, found) in &rows {
-        let cell = |s: &Summary| format!("{:.0}, {} %", s.travel, shown(100.0 * s.stuck));
+        let cell = |s: &Summary| format!("{:.4}°, {:.0}, {} %", s.rms, s.travel, shown(100.0 * s.stuck));
         println!("| {} | {} |", law.title, found.iter().map(cell).collect::<Vec<_>>().join(" | "));
     }
     let Some(file) = file else { return Ok(()) };

@@ -6,6 +6,7 @@
 
 mod bristles;
 mod laws;
+mod loops;
 mod motor;
 mod steps;
 mod troubles;
@@ -28,6 +29,10 @@ const FRESH_MOTORS: Range<i64> = 9001..9011;
 
 /// The rate below which glide goes in micro-steps, where it does, °/s.
 const STEPS_BELOW: (&str, f64) = ("law.glide.micro_below_deg_s", 0.95);
+
+/// Keys whose values are whole numbers.
+const WHOLE: [&str; 4] =
+    ["rig.encoder.counts_per_rev", "sampling.period_us", "rig.delay_ticks", "law.glide.filter.delay_ticks"];
 
 /// Departures of the rig from what it is without them, one at a time, and those that the law is told of.
 const PLANTS: &[(&str, &[(&str, f64)])] = &[
@@ -91,9 +96,8 @@ fn runs_of(scenario: &str, keys: &[(&str, f64)], seeds: Range<i64>) -> Outcome<V
     names.extend(keys.iter().map(|(key, _)| (*key).to_owned()));
     let rows = seeds.map(|seed| {
         let mut row = vec![Value::Integer(seed)];
-        row.extend(keys.iter().map(|(key, value)| match *key {
-            "rig.encoder.counts_per_rev" => Value::Integer(*value as i64),
-            _ => Value::Float(*value),
+        row.extend(keys.iter().map(|(key, value)| {
+            if WHOLE.contains(key) { Value::Integer(*value as i64) } else { Value::Float(*value) }
         }));
         row
     });
@@ -203,10 +207,11 @@ fn main() -> Outcome<()> {
         Some("plants") => plants(),
         Some("rest") => rest(),
         Some("troubles") => troubles::troubles(),
+        Some("loops") => loops::loops(),
         Some("steps") => steps::steps(),
         Some("motions") => steps::motions(),
         Some("motor") => motor::motor(),
         Some("bristles") => bristles::bristles(),
-        _ => Err("expected laws, plants, rest, troubles, steps, motions, motor or bristles".into()),
+        _ => Err("expected laws, plants, rest, troubles, loops, steps, motions, motor or bristles".into()),
     }
 }

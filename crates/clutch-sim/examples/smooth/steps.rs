@@ -20,7 +20,6 @@ const RIGS: &[(&str, &[(&str, f64)])] = &[
     ("torque noise of 1 mN m", &[("rig.torque_noise_nm", 0.001)]),
     ("lag of 0.5 ms", &[("rig.actuator_time_constant_s", 0.0005)]),
     ("lag of 1 ms", &[("rig.actuator_time_constant_s", 0.001)]),
-    ("lag of 3 ms, told", &[("rig.actuator_time_constant_s", 0.003), ("law.glide.filter.lag_s", 0.003)]),
     (
         "2 000 counts",
         &[("rig.encoder.counts_per_rev", 2000.0), ("law.glide.filter.ripple_waves_per_turn", 90.0)],
