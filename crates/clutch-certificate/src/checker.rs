@@ -1,7 +1,7 @@
 //! The checker of a certificate: multiplications with outward rounding, in one sweep.
 //!
 //! It derives the model from [`Setup`] by itself and shares no code with the search, only the plain data of
-//! [`crate::setup`]. For every row `c` of a cell's set and everything that can happen in a tick it holds the claim
+//! [`crate::setup`]: types and the version, of which it calls nothing. For every row `c` of a cell's set and everything that can happen in a tick it holds the claim
 //!
 //! ```text
 //! c·x⁺ ≤ F·y + f₀ = Σ λ_j a_j·y + (F − Σ λ_j a_j)·y + f₀ ≤ Σ λ_j b_j + |F − Σ λ_j a_j|·|y| + f₀ ≤ r
@@ -318,7 +318,7 @@ fn covered(certificate: &Certificate) -> Result<(), Refused> {
 
 /// Bound on `|e|` of a cell, rad, and the programs it took.
 fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
-    let n = setup.dimension();
+    let n = numbers_of_a_row(setup);
     shape(cell, n)?;
     let shaft = Shaft::new(setup, cell);
     let walls = walls(cell, n)?;
@@ -377,6 +377,12 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
     }
     let error = at(walls[0].0.max(walls[0].1)) + at(shaft.bend);
     Ok(((error * shaft.count).high, programs))
+}
+
+/// Numbers of the state `(e, ė, z, p₁ … p_d, I, m₋)`, `I` of an integral only.
+fn numbers_of_a_row(setup: &Setup) -> usize {
+    let integral = if let Gains::Integral { .. } = setup.law { 1 } else { 0 };
+    3 + setup.delay_ticks as usize + integral + 1
 }
 
 fn shape(cell: &Cell, n: usize) -> Result<(), Flaw> {
@@ -503,4 +509,27 @@ fn combined(
         bound = bound + *left * Interval { low: -below, high: above.max(-below) };
     }
     Ok(bound.high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_state_and_the_volts_of_a_motor_are_numbered_as_the_search_does() {
+        let linear = Gains::Linear { kp: 1.0, kd: 1.0, forward: 0.0 };
+        let integral =
+            Gains::Integral { kp: 1.0, ki: 1.0, kd: 1.0, forward: 0.0, tracking: 0.1, limits: [0.0, 1.0] };
+        for (law, delay_ticks, numbers) in
+            [(linear, 0, 4), (linear, 3, 7), (integral, 0, 5), (integral, 2, 7)]
+        {
+            let setup = Setup { delay_ticks, ..Setup::paper(law) };
+            assert_eq!((numbers_of_a_row(&setup), setup.dimension()), (numbers, numbers));
+        }
+        for (highest, before, from) in [(4.0, 0.1, 5.0), (4.1, 0.1, 6.0), (4.0, 5.5, 7.0), (-0.5, -0.2, 1.0)]
+        {
+            let setup = Setup { volts: [-1.0, highest], start_volts: [-1.0, before], ..Setup::paper(linear) };
+            assert_eq!((shaft::counted_from(&setup), setup.counted_from()), (from, from));
+        }
+    }
 }

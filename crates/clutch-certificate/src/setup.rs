@@ -1,6 +1,7 @@
 //! Plain data of a certificate: the box of plants, the law, the cells with their rows, radii and multipliers.
 //!
-//! Both the search and the [`crate::checker`] read these, and nothing else is common to them. A saved certificate is this
+//! Both the search and the [`crate::checker`] read these types, and nothing else is common to them: what is computed here the
+//! search alone calls, and the checker derives anew. A saved certificate is this
 //! data as JSON: [`crate::file`].
 
 use serde::{Deserialize, Serialize};

@@ -421,6 +421,11 @@ fn a_motor_axis_has_a_bound_of_a_few_counts_and_each_change_of_it_is_refused() {
     change(&|s| s.at_rest[1] = 0.25);
     change(&|s| s.ripple = 0.02);
     change(&|s| s.volts[1] = 6.0);
+    // Fewer volts and no other shaft; but the rows count volts from 5 V down, and there they are counted from 4 V.
+    change(&|s| s.volts[1] = 2.9);
+    let integral =
+        Gains::Integral { kp: 500.0, ki: 1.0, kd: 8.0, forward: 0.6, tracking: 0.05, limits: [-0.4, 4.0] };
+    change(&|s| s.law = integral);
     change(&|s| s.law = Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.65 });
     change(&|s| s.law = Gains::Linear { kp: 500.0, kd: 8.0, forward: 0.55 });
     change(&|s| s.law = Gains::Linear { kp: 480.0, kd: 8.0, forward: 0.6 });

@@ -159,7 +159,7 @@ impl<'a> Common<'a> {
         let friction =
             |least: Interval, most: Interval| Interval { low: least.low, high: most.high } * normal;
         let held = friction(self.rest.0.min(self.sliding.0), self.rest.1.max(self.sliding.1));
-        let from = at(s.counted_from());
+        let from = at(counted_from(s));
         let turn = Turned {
             gain: Interval { low: motor.gain[0], high: motor.gain[1] },
             torque: Interval { low: self.drive.0.low, high: self.drive.1.high },
@@ -215,6 +215,13 @@ impl<'a> Common<'a> {
     }
 }
 
+/// Voltage from which a motor's are counted downwards, V: the whole number from the highest on, and one more for what converter
+/// and law round. Multipliers that speak of volts counted from another prove nothing here.
+pub(crate) fn counted_from(s: &Setup) -> f64 {
+    let [highest, before] = [s.volts[1], s.start_volts[1]];
+    (if before > highest { before } else { highest }).ceil() + 1.0
+}
+
 impl Shaft {
     pub(crate) fn new(s: &Setup, cell: &Cell) -> Shaft {
         let tau =
@@ -240,7 +247,7 @@ impl Shaft {
             volts_off: common.volts_off,
             kappa: at(s.smoothing),
             delay: s.delay_ticks as usize,
-            counted_from: s.motor.map(|_| s.counted_from()),
+            counted_from: s.motor.map(|_| counted_from(s)),
             bend: (shape.drives.1.max(shape.drives_anywhere.1).max(shape.most_slowing) / at(8.0)).high,
             cap: cell.speed_cap,
         }
