@@ -285,7 +285,7 @@ fn gain(s: &Setup) -> (&'static str, [f64; 2]) {
     s.motor.as_ref().map_or(("K_COF", s.brake_gain), |motor| ("k_t", motor.gain))
 }
 
-/// The plants and the loop that a bound speaks of.
+/// Every plant and everything of the loop that a bound speaks of, but the gains of the law.
 fn scope(s: &Setup) -> String {
     let range = |side: [f64; 2]| {
         let [low, high] = side;
@@ -301,22 +301,31 @@ fn scope(s: &Setup) -> String {
     } else {
         format!(", v_s up to {} rad/s, δ {}", number(velocity), number(exponent))
     };
+    let steps = if s.converter_step > 0.0 {
+        format!(" in steps of {}", number(s.converter_step))
+    } else {
+        String::new()
+    };
     let mut out = format!(
-        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}{falls}; J {} kg m², T_u {} N m, {name} {} N m/V",
+        "every {} µs, {}, {} counts/rev, K_Kal {}, volts {}{steps}; ramp at {} °/s, {} with {} V; mu_d {}, mu_s {}{}{falls}; J {} kg m², T_u {} N m, C_d {} N m s/rad, {name} {} N m/V",
         number(1e6 * s.period_s),
         ticks(s),
         s.counts_per_rev,
+        number(s.smoothing),
+        range(s.volts),
         number(s.rate.to_degrees()),
         if s.from_rest { "from rest" } else { "begun at its speed" },
+        range(s.start_volts),
         range(s.sliding),
         range(s.at_rest),
         if s.rest_not_below_sliding { ", never below mu_d" } else { "" },
         range(s.inertia),
         range(s.drive_torque),
+        range(s.viscous_damping),
         range(gain),
     );
     if let Some(motor) = &s.motor {
-        out += &format!(", N_0 {} N m, volts {}", number(motor.preload), range(s.volts));
+        out += &format!(", N_0 {} N m", number(motor.preload));
     }
     if let Gains::Shell { slope, boundary } = s.law {
         out += &format!("; shell f {} 1/s, S {} rad/s", number(slope), number(boundary));
@@ -343,5 +352,52 @@ impl Scenario {
         let stability = setup.as_ref().ok().and_then(within);
         let slower_fall = setup.as_ref().ok().and_then(|s| self.slower_fall(s.stribeck));
         Sampled { setup, stability, slower_fall }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clutch_certificate::Motor;
+
+    #[test]
+    fn the_box_of_a_bound_tells_all_that_its_proof_is_for() {
+        let mut setup = Setup::paper(Gains::Linear { kp: 5000.0, kd: 50.0, forward: 0.0 });
+        assert_eq!(
+            scope(&setup),
+            "every 1000 µs, 0 ticks of delay, 20000 counts/rev, K_Kal 0.2, volts 0 … 9.995 in steps of 0.0048828; ramp at 2 °/s, \
+             begun at its speed with 1.68 … 2.25 V; mu_d 0.15, mu_s 0.2, never below mu_d, v_s up to 0.001 rad/s, δ 1; \
+             J 0.0017 kg m², T_u 0.047088 N m, C_d 0.001 N m s/rad, K_COF 0.14 N m/V"
+        );
+        // Each quantity of the proof that is not the law's changes the line.
+        let before = scope(&setup);
+        let changes: [fn(&mut Setup); 19] = [
+            |s| s.period_s = 0.002,
+            |s| s.counts_per_rev = 4096,
+            |s| s.inertia[1] = 0.002,
+            |s| s.drive_torque[0] = 0.04,
+            |s| s.viscous_damping = [0.0, 0.002],
+            |s| s.brake_gain[1] = 0.2,
+            |s| s.motor = Some(Motor { gain: [0.05; 2], preload: 0.2 }),
+            |s| s.sliding[0] = 0.1,
+            |s| s.at_rest[1] = 0.3,
+            |s| s.rest_not_below_sliding = false,
+            |s| s.stribeck[0] = 0.002,
+            |s| s.ripple = 0.1,
+            |s| s.torque_noise = 0.001,
+            |s| s.delay_ticks = 1,
+            |s| s.converter_step = 0.0,
+            |s| s.volts[1] = 5.0,
+            |s| s.smoothing = 0.5,
+            |s| s.from_rest = true,
+            |s| s.start_volts[0] = 0.0,
+        ];
+        for (k, change) in changes.iter().enumerate() {
+            let mut other = setup.clone();
+            change(&mut other);
+            assert_ne!(scope(&other), before, "change {k}");
+        }
+        setup.viscous_damping = [0.0005, 0.0015];
+        assert!(scope(&setup).contains("C_d 0.0005 … 0.0015 N m s/rad"));
     }
 }
