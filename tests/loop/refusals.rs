@@ -206,7 +206,7 @@ fn a_loop_arms_on_its_own_certificate_and_on_no_other() {
     let log = folder.join("run.mcap");
     let more = ["--certificate", file, "--duration", "1.2", "--log", log.to_str().unwrap()];
     let _ = with("loop", gains, &more).expect(0).prints(&[
-        "not certified in continuous time; certified as sampled",
+        "not certified in continuous time; certified as sampled for the bounds given",
         "|e| below 0.16",
         "certified for a ramp at 20 °/s, 0 ticks of delay",
         "sticks not excluded",

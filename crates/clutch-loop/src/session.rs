@@ -659,14 +659,17 @@ impl Course<'_> {
             number(boot)
         );
         let fastest = number(plan.envelope.velocity.to_degrees());
-        let gains = if self.session.certified() && !scenario.outside_bounds(&plan.bounds)?.is_empty() {
-            "certified in continuous time for the bounds given, outside of which the scenario's rig lies"
-        } else if self.session.certified() {
-            "certified in continuous time for the bounds given"
+        let outside = |lines: Vec<String>| {
+            if lines.is_empty() { "" } else { ", outside of which the scenario's rig lies" }
+        };
+        let gains = if self.session.certified() {
+            let outside = outside(scenario.outside_bounds(&plan.bounds)?);
+            format!("certified in continuous time for the bounds given{outside}")
         } else if cleared.proven.is_some() && cleared.sampled.bound_suffices() {
-            "not certified in continuous time; certified as sampled"
+            let outside = outside(scenario.outside_sampled(&plan.bounds)?);
+            format!("not certified in continuous time; certified as sampled for the bounds given{outside}")
         } else {
-            "NOT certified in continuous time; run all the same, as asked"
+            "NOT certified in continuous time; run all the same, as asked".to_owned()
         };
         let mut rows = vec![
             ("port", format!("{}, {}", self.address, kind.describe())),
@@ -679,7 +682,7 @@ impl Course<'_> {
                 ),
             ),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
-            ("gains", gains.to_owned()),
+            ("gains", gains),
             ("as sampled", cleared.sampled.short_line(cleared.proven.as_ref())),
             ("safe state", format!("{safe}: {}", safety.reason.0)),
             ("watchdog", format!("{} {} on the board", safety.limits.watchdog_cycles, CYCLES.text)),

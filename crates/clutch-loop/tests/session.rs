@@ -133,6 +133,56 @@ fn a_bound_as_sampled_is_not_of_a_rig_whose_friction_falls_more_slowly() {
     assert_eq!(slower(&[velocity, ("rig.friction.stribeck.mu_static", "0.15")]), None, "there is no fall");
 }
 
+/// A scenario's certificate as sampled, in a file of its own.
+fn saved(scenario: &Scenario, name: &str) -> std::path::PathBuf {
+    let (_, certificate) = scenario.sampled(&scenario.plan().unwrap().bounds).prove().unwrap();
+    let path = std::env::temp_dir().join(format!("clutch-session-{}-{name}.json", std::process::id()));
+    std::fs::write(&path, serde_json::to_vec(&certificate).unwrap()).unwrap();
+    path
+}
+
+#[test]
+fn a_rig_outside_of_the_box_is_told_with_either_certificate() {
+    // As sampled alone: in continuous time PD has no certificate at this rate. Noise and delay are a part of that box.
+    let pd = [
+        ("law", "{ pd = { kp_v_rad = 1660.0, kd_v_s_rad = 12.9 } }"),
+        ("velocity.smoothed_derivative.smoothing", "0.712"),
+        ("reference.ramp.rate_deg_s", "20.0"),
+        ("rig.delay_ticks", "1"),
+        ("rig.torque_noise_nm", "1e-5"),
+        ("run.duration_s", "0.3"),
+        ("run.settle_s", "0.1"),
+    ];
+    let file = saved(&scenario("board_smc_2", &pd), "outside");
+    let gains = |set: &[(&str, &str)], certificate: Option<&std::path::PathBuf>| {
+        let options = SessionOptions { certificate: certificate.cloned(), ..options() };
+        let session = Session::new(scenario("board_smc_2", set), options).unwrap();
+        let (_, events) = run(&session, &Arc::default(), f64::INFINITY);
+        let Some(Event::Announced(announcement)) = events.into_iter().next() else {
+            panic!("nothing was announced")
+        };
+        announcement.rows.iter().find(|(name, _)| *name == "gains").unwrap().1.clone()
+    };
+    let sampled = "not certified in continuous time; certified as sampled for the bounds given";
+    let remark = ", outside of which the scenario's rig lies";
+    assert_eq!(gains(&pd, Some(&file)), sampled);
+    for outside in [
+        ("rig.viscous_damping_nm_s_rad", "0.0012"),
+        ("rig.friction.stribeck.mu_dynamic", "0.14"),
+        ("rig.friction.stribeck.stribeck_velocity_rad_s", "0.002"),
+    ] {
+        assert_eq!(
+            gains(&[&pd[..], &[outside]].concat(), Some(&file)),
+            format!("{sampled}{remark}"),
+            "{outside:?}"
+        );
+    }
+    let damping =
+        [("rig.viscous_damping_nm_s_rad", "0.0012"), ("run.duration_s", "0.3"), ("run.settle_s", "0.1")];
+    assert_eq!(gains(&damping, None), format!("certified in continuous time for the bounds given{remark}"));
+    std::fs::remove_file(file).unwrap();
+}
+
 #[test]
 fn the_path_is_announced_run_to_its_end_and_done() {
     let session = Session::new(scenario("board_smc_2", &[("run.duration_s", "1.2")]), options()).unwrap();

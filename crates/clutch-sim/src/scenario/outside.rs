@@ -1,4 +1,4 @@
-//! The rig of a scenario against the bounds that its certificate in continuous time was asked for.
+//! The rig of a scenario against the bounds that its certificates were asked for.
 
 use super::{NOISE_ROOTS, Scenario, ScenarioError};
 use crate::number;
@@ -33,6 +33,15 @@ impl Outside {
     }
 }
 
+/// The certificate whose bounds are asked for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Of {
+    /// That in continuous time.
+    ContinuousTime,
+    /// The bound as sampled. Its box has noise, delay and ripple of `[rig]`, and there is none with a lag.
+    Sampled,
+}
+
 impl Scenario {
     /// Properties of the rig that lie outside the bounds that the certificate in continuous time was asked for, or that no
     /// bounds have, as delay and lag: a line each. That certificate says nothing of such a rig.
@@ -40,11 +49,24 @@ impl Scenario {
     /// # Errors
     /// None for a checked scenario.
     pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
+        self.outside(bounds, Of::ContinuousTime)
+    }
+
+    /// Properties of the rig that lie outside the box of plants of a bound as sampled: a line each. That bound says nothing of
+    /// such a rig.
+    ///
+    /// # Errors
+    /// None for a checked scenario.
+    pub fn outside_sampled(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
+        self.outside(bounds, Of::Sampled)
+    }
+
+    fn outside(&self, bounds: &Bounds, of: Of) -> Result<Vec<String>, ScenarioError> {
         let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
         let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
         let mut lines = Outside::default();
         lines.check("inertia", KG_M2, p.inertia, p.inertia, &bounds.inertia);
-        self.drive(&rig, bounds, &mut lines);
+        self.drive(&rig, bounds, of, &mut lines);
         lines.check(
             "viscous damping",
             NM_S_RAD,
@@ -57,8 +79,11 @@ impl Scenario {
         lines.check("motor gain", NM_V, motor, motor, &bounds.motor_gain);
         lines.exactly("preload", NM, actuator.preload(), bounds.preload);
         lines.exactly("load share", NONE, actuator.load_share(), bounds.load_share);
-        self.friction(&rig, bounds, &mut lines);
-        self.time(&mut lines);
+        self.friction(&rig, bounds, of, &mut lines);
+        match of {
+            Of::ContinuousTime => self.time(&mut lines),
+            Of::Sampled => lines.0.extend(self.sampled(bounds).slower_fall),
+        }
         Ok(lines.0)
     }
 
@@ -80,10 +105,10 @@ impl Scenario {
     }
 
     /// The drive's torque, with that at random on it.
-    fn drive(&self, rig: &Rig, bounds: &Bounds, lines: &mut Outside) {
+    fn drive(&self, rig: &Rig, bounds: &Bounds, of: Of, lines: &mut Outside) {
         let (low, high) = rig.drive.range();
         let noise = self.params.rig.torque_noise;
-        if noise > 0.0 {
+        if noise > 0.0 && of == Of::ContinuousTime {
             let name = format!("driving torque ± {NOISE_ROOTS} · {} N m of noise", number(noise));
             lines.check(
                 &name,
@@ -97,15 +122,17 @@ impl Scenario {
         }
     }
 
-    fn friction(&self, rig: &Rig, bounds: &Bounds, lines: &mut Outside) {
+    fn friction(&self, rig: &Rig, bounds: &Bounds, of: Of, lines: &mut Outside) {
         let model = rig.model.plant.friction();
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let kinds = [
             ("static friction", model.at_rest(), &bounds.friction_at_rest),
             ("dynamic friction", model.sliding(), &bounds.friction_sliding),
         ];
+        // Where the bounds name no ripple, the box as sampled has the rig's around each mean.
+        let around = if of == Of::Sampled { 0.0 } else { swing };
         for (name, mu, bound) in kinds {
-            lines.check(name, NONE, mu * (1.0 - swing), mu * (1.0 + swing), bound);
+            lines.check(name, NONE, mu * (1.0 - around), mu * (1.0 + around), bound);
         }
         let known = &self.params.bounds;
         if let Some(share) = known.ripple {
@@ -115,8 +142,14 @@ impl Scenario {
             }
             lines.check("ripple of friction", NONE, swing, swing, &Interval { low: 0.0, high: share });
         }
-        if model.bristles().is_some_and(|b| b.damps()) {
-            lines.0.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
+        match of {
+            Of::ContinuousTime if model.bristles().is_some_and(|b| b.damps()) => {
+                lines.0.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
+            }
+            Of::Sampled if model.bristles().is_some() => {
+                lines.0.push("friction has bristles, a bound as sampled none".to_owned());
+            }
+            _ => {}
         }
     }
 
