@@ -1,6 +1,6 @@
 //! Healthy shafts: drawn from anywhere inside wide bounds, under every law that follows a path, with lines that lose, delay and
 //! jitter.
-//! Nothing is broken, so that the supervisor's envelope may end none of them.
+//! Nothing is broken but the line, so that no other check may end one of them: [`is_nuisance`].
 
 use crate::campaign::CampaignError;
 use crate::campaign::healthy_run::RigName;
@@ -17,9 +17,14 @@ use clutch_sim::{Scenario, ScenarioError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Causes by which the envelope ends control.
-pub const ENVELOPE: [Cause; 5] =
-    [Cause::StandStill, Cause::Channel, Cause::Reversed, Cause::TooSlow, Cause::TooFast];
+/// Causes that a bad line explains: samples lost or late, none for too long, and a board whose watchdog got no codes.
+const OF_A_BAD_LINE: [Cause; 4] = [Cause::Lost, Cause::Late, Cause::Silence, Cause::Board];
+
+/// True if a run of a healthy shaft may not end so: by any check but those of a bad line.
+#[must_use]
+pub fn is_nuisance(cause: Cause) -> bool {
+    Cause::CHECKS.contains(&cause) && !OF_A_BAD_LINE.contains(&cause)
+}
 
 /// A healthy shaft and its run; everything follows from its seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,6 +133,13 @@ impl HealthyShaft {
 mod tests {
     use super::*;
     use clutch_core::law::LawParams;
+
+    #[test]
+    fn every_check_but_those_of_a_bad_line_counts_as_a_nuisance() {
+        let excused: Vec<_> = Cause::CHECKS.into_iter().filter(|cause| !is_nuisance(*cause)).collect();
+        assert_eq!(excused, [Cause::Lost, Cause::Late, Cause::Silence, Cause::Board]);
+        assert!(![Cause::None, Cause::Operator, Cause::Done].into_iter().any(is_nuisance));
+    }
 
     /// The one run under sliding mode with a layer, of seeds 10 001 to 60 000, that ends by [`Cause::Saturation`] with the gains of Table 2.
     const TOO_WEAK: u64 = 11_522;
