@@ -1,5 +1,6 @@
 //! Laws that do their worst within a shell: what a bound "with any inner law" has to bear.
 
+use clutch_core::Real;
 use clutch_core::law::{Command, ControlLaw, Limit, Tick};
 
 /// Ways to be bad.
@@ -88,26 +89,27 @@ impl Adversary {
     }
 }
 
-impl ControlLaw<f64> for Adversary {
+impl<T: Real> ControlLaw<T> for Adversary {
     type State = Memory;
-    type Terms = [f64; 0];
+    type Terms = [T; 0];
     const TERMS: &'static [&'static str] = &[];
 
-    fn start(&self, _: &Tick<f64>, _: f64) -> Memory {
+    fn start(&self, _: &Tick<T>, _: T) -> Memory {
         Memory::default()
     }
 
-    fn update(&self, memory: &mut Memory, tick: &Tick<f64>) -> Command<f64, [f64; 0]> {
+    fn update(&self, memory: &mut Memory, tick: &Tick<T>) -> Command<T, [T; 0]> {
+        let [error, rate] = [tick.error.to_f64(), tick.error_rate.to_f64()];
         let slow_if = |behind: bool| if behind != self.motor { self.highest } else { self.lowest };
         let voltage = match self.way {
             Way::Random => self.any(memory),
             Way::Nothing => self.lowest,
             Way::Full => self.highest,
             Way::Holds => self.hold(memory),
-            Way::AwayFromSurface => slow_if(self.slope * tick.error + tick.error_rate > 0.0),
-            Way::WithRate => slow_if(tick.error_rate > 0.0),
-            Way::WithError => slow_if(tick.error > 0.0),
+            Way::AwayFromSurface => slow_if(self.slope * error + rate > 0.0),
+            Way::WithRate => slow_if(rate > 0.0),
+            Way::WithError => slow_if(error > 0.0),
         };
-        Command { voltage, limit: Limit::None, terms: [] }
+        Command { voltage: T::from_f64(voltage), limit: Limit::None, terms: [] }
     }
 }

@@ -6,18 +6,20 @@
 //! ```
 //!
 //! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box; `integral`
-//! does so for PI, `shell` for shells, with laws within that do their worst, `motor` for motor axes. `campaign` draws sets and
-//! shells, too, with tolerances, ripple and noise, and counts broken bounds; `campaign-integral` draws PI alone, `campaign-motor`
-//! motor axes. They begin at a seed, so that shares of them can run beside each other.
+//! does so for PI, `shell` for shells, with laws within that do their worst, `rates` for paths up to 100 °/s, `motor` for motor
+//! axes. `campaign` draws sets and shells, too, with tolerances, ripple and noise, and counts broken bounds; `campaign-integral`
+//! draws PI alone, `campaign-motor` motor axes. Each of the seeds that are given begins a share of the runs; shares can also be
+//! asked for one by one, and run beside each other.
 
 mod adversary;
 
 use adversary::{Adversary, Way};
 use clutch_certificate::{Options, Setup, checker, largest, search};
 use clutch_core::friction::{FrictionParams, StribeckParams};
-use clutch_core::{BrakeActuator, MotorActuator, PlantParams, Servo};
+use clutch_core::{BrakeActuator, MotorActuator, PlantParams, Real, Servo};
 use clutch_sim::drive::DriveParams;
 use clutch_sim::progress::UNWATCHED;
+use clutch_sim::run::Start;
 use clutch_sim::{Keep, RigParams, Scenario, simulate_servo};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -144,9 +146,25 @@ fn scenario(gains: Gains, more: &[(&str, f64)]) -> Outcome<Scenario> {
     Ok(Scenario::parse(name, built_in.map_or("", |b| b.toml), &keys)?)
 }
 
-/// A number of the box: an end one time in two, else any between.
-fn within(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
-    match rng.random_range(0..4) {
+/// A plant's place in the box.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    /// Every parameter at an end of its side.
+    Corner,
+    /// Every parameter anywhere on its side.
+    Within,
+    /// Each parameter for itself: at an end one time in two.
+    Mixed,
+}
+
+/// A number of a side of the box.
+fn number_of(place: Place, rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
+    let which = match place {
+        Place::Corner => u32::from(!rng.random::<bool>()),
+        Place::Within => 2,
+        Place::Mixed => rng.random_range(0..4),
+    };
+    match which {
         0 => low,
         1 => high,
         _ => low + (high - low) * rng.random::<f64>(),
@@ -154,7 +172,8 @@ fn within(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
 }
 
 /// A rig of the box.
-fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, rng: &mut Pcg64) -> RigParams {
+fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, place: Place, rng: &mut Pcg64) -> RigParams {
+    let within = |rng: &mut Pcg64, side: [f64; 2]| number_of(place, rng, side);
     let mut rig = base.clone();
     rig.inertia = within(rng, setup.inertia);
     rig.viscous_damping = within(rng, setup.viscous_damping);
@@ -196,11 +215,28 @@ fn model_friction(model: &PlantParams) -> StribeckParams {
     }
 }
 
-/// The largest |e| of a run of a plant of the box, rad, and its sticks per second.
-fn run(scenario: &Scenario, setup: &Setup, seconds: f64, seed: u64) -> Outcome<(f64, f64)> {
+/// A run of a plant of the box.
+struct Trial {
+    /// Length, s.
+    seconds: f64,
+    /// Seed of the plant, of its disc and noise, and of a bad law.
+    seed: u64,
+    /// The plant's place in the box.
+    place: Place,
+    /// `true` if law and path are computed in single precision.
+    single: bool,
+}
+
+/// The largest |e| of a trial, rad, and its sticks per second.
+fn run(scenario: &Scenario, setup: &Setup, trial: &Trial) -> Outcome<(f64, f64)> {
+    if trial.single { run_in::<f32>(scenario, setup, trial) } else { run_in::<f64>(scenario, setup, trial) }
+}
+
+fn run_in<T: Real>(scenario: &Scenario, setup: &Setup, trial: &Trial) -> Outcome<(f64, f64)> {
+    let &Trial { seconds, seed, place, .. } = trial;
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut spec = scenario.spec();
-    spec.rig = plant(&spec.rig, &spec.model, setup, &mut rng);
+    spec.rig = plant(&spec.rig, &spec.model, setup, place, &mut rng);
     spec.run.seed = seed;
     spec.run.duration = seconds;
     spec.run.settle = 0.0;
@@ -209,9 +245,10 @@ fn run(scenario: &Scenario, setup: &Setup, seconds: f64, seed: u64) -> Outcome<(
         let [lowest, highest] = [spec.output.lowest, spec.output.highest];
         let law =
             Adversary { way, seed, lowest, highest, slope: spec.shell.slope, motor: setup.motor.is_some() };
-        simulate_servo(&spec, &Servo::with_law(&spec.servo()?, law)?, Keep::Figures, UNWATCHED)?
+        let servo = Servo::<T, _>::with_law(&spec.servo()?.cast(), law).map_err(|e| e.cast::<f64>())?;
+        simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED)?
     } else {
-        clutch_sim::run::simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED)?
+        clutch_sim::run::simulate_watched::<T>(&spec, Keep::Figures, UNWATCHED)?
     };
     Ok((run.metrics.max_error_rad, run.metrics.stick_slip_cycles_per_s))
 }
@@ -271,7 +308,8 @@ fn measure(scenario: &Scenario, runs: u64) -> Outcome<Row> {
 fn worst(scenario: &Scenario, setup: &Setup, runs: u64) -> Outcome<(f64, f64)> {
     let (mut seen, mut sticks) = (0.0_f64, 0.0_f64);
     for seed in 0..runs {
-        let (error, cycles) = run(scenario, setup, 3.0, seed)?;
+        let trial = Trial { seconds: 3.0, seed, place: Place::Mixed, single: false };
+        let (error, cycles) = run(scenario, setup, &trial)?;
         seen = seen.max(error.to_degrees());
         sticks = sticks.max(cycles);
     }
@@ -339,7 +377,7 @@ enum Drawn {
     Motor,
 }
 
-/// Gains, loop and box at random.
+/// Gains, loop, box and start at random.
 fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
     let delayed = rng.random::<bool>();
     let delay = f64::from(u8::from(delayed));
@@ -403,11 +441,16 @@ fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
         keys.push(("bounds.brake_gain_percent", gain));
     }
     let scenario = scenario(gains, &keys)?;
+    let mut table = scenario.table().clone();
+    let start = if rng.random::<bool>() { Start::Rest } else { Start::OnPath };
+    let run = table.entry("run").or_insert_with(|| toml::Value::Table(toml::Table::new()));
+    if let toml::Value::Table(run) = run {
+        run.insert("start".into(), start.name().into());
+    }
     if ripple == 0.0 {
-        return Ok(scenario);
+        return Ok(Scenario::from_table("campaign", table, &[])?);
     }
     // A band of five waves, of which the largest departure is √10 times the root mean square.
-    let mut table = scenario.table().clone();
     let waves = format!(
         "rms = {:?}\nlowest_waves_per_turn = 120\nhighest_waves_per_turn = 600\nspacing_waves_per_turn = 120\n",
         ripple / libm::sqrt(10.0)
@@ -419,10 +462,11 @@ fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
 }
 
 /// Shells on the paper's rig, with every adversary.
-const SHELLS: [(Gains, f64, f64, f64); 8] = [
+const SHELLS: [(Gains, f64, f64, f64); 9] = [
     (Gains::Shell(100.0, 0.1, 1.0), 0.0, 2.0, 0.0),
     (Gains::Shell(100.0, 0.1, 1.0), 0.0, 2.0, 40.0),
     (Gains::Shell(100.0, 0.1, 1.0), 0.0, 20.0, 0.0),
+    (Gains::Shell(100.0, 0.1, 1.0), 1.0, 2.0, 0.0),
     (Gains::Shell(100.0, 0.1, 0.5), 0.0, 2.0, 0.0),
     (Gains::Shell(100.0, 0.05, 1.0), 0.0, 2.0, 0.0),
     (Gains::Shell(50.0, 0.1, 1.0), 0.0, 2.0, 0.0),
@@ -442,6 +486,18 @@ const INTEGRALS: [(Gains, f64, f64, f64); 8] = [
     (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 1.0, 2.0, 0.0),
 ];
 
+/// Fast paths on the paper's rig: delay in ticks, rate in °/s, tolerance of friction in %.
+const RATES: [(Gains, f64, f64, f64); 8] = [
+    (Gains::Pd(1660.0, 12.9, 0.712), 0.0, 50.0, 40.0),
+    (Gains::Pd(1660.0, 12.9, 0.712), 1.0, 50.0, 40.0),
+    (Gains::Pd(1660.0, 12.9, 0.712), 0.0, 100.0, 40.0),
+    (Gains::Pd(1660.0, 12.9, 0.712), 1.0, 100.0, 40.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 50.0, 0.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 100.0, 0.0),
+    (Gains::Shell(100.0, 0.1, 1.0), 0.0, 50.0, 0.0),
+    (Gains::Shell(50.0, 0.1, 1.0), 0.0, 50.0, 0.0),
+];
+
 /// Motor axes: delay in ticks, rate in °/s, tolerance of friction in %.
 const MOTORS: [(Gains, f64, f64, f64); 10] = [
     (Gains::MotorPid([500.0, 0.0, 8.0], 0.5, 0.0), 0.0, 2.0, 0.0),
@@ -456,7 +512,10 @@ const MOTORS: [(Gains, f64, f64, f64); 10] = [
     (Gains::MotorShell(50.0, 0.2, 0.2), 0.0, 20.0, 0.0),
 ];
 
-/// Sets of one kind, each with its delay, rate and tolerance.
+/// The column of a table with laws of several kinds.
+const ANY_LAW: &str = "law";
+
+/// Sets, each with its delay, rate and tolerance.
 fn sets(sets: &[(Gains, f64, f64, f64)], columns: &str) -> Outcome<()> {
     println!(
         "| {columns} | delay | °/s | friction | certified, ° | seen, ° | ratio | cells | CPU s per cell |"
@@ -469,9 +528,13 @@ fn sets(sets: &[(Gains, f64, f64, f64)], columns: &str) -> Outcome<()> {
             ("bounds.friction_percent", friction),
         ];
         let row = measure(&scenario(gains, &keys)?, 210)?;
+        let title = match gains {
+            Gains::Pid(..) if columns == ANY_LAW => format!("PID {}", gains.title()),
+            Gains::Shell(..) if columns == ANY_LAW => format!("shell {}", gains.title()),
+            _ => gains.title(),
+        };
         println!(
-            "| {} | {delay} | {rate} | ±{friction} % | {} | {:.4} | {} | {} | {:.2} |",
-            gains.title(),
+            "| {title} | {delay} | {rate} | ±{friction} % | {} | {:.4} | {} | {} | {:.2} |",
             row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}")),
             row.seen,
             row.certified.map_or("–".to_owned(), |c| format!("{:.2}", c / row.seen)),
@@ -490,33 +553,64 @@ struct Tally {
     certified: u64,
     shells: u64,
     runs: u64,
+    from_rest: u64,
+    single: u64,
+    corners: u64,
     stuck: u64,
     broken: u64,
     nearest: f64,
+    nearest_from_rest: f64,
+}
+
+impl Tally {
+    /// Of both.
+    fn with(&self, share: &Tally) -> Tally {
+        Tally {
+            sets: self.sets + share.sets,
+            unstable: self.unstable + share.unstable,
+            certified: self.certified + share.certified,
+            shells: self.shells + share.shells,
+            runs: self.runs + share.runs,
+            from_rest: self.from_rest + share.from_rest,
+            single: self.single + share.single,
+            corners: self.corners + share.corners,
+            stuck: self.stuck + share.stuck,
+            broken: self.broken + share.broken,
+            nearest: self.nearest.max(share.nearest),
+            nearest_from_rest: self.nearest_from_rest.max(share.nearest_from_rest),
+        }
+    }
 }
 
 impl std::fmt::Display for Tally {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Tally { sets, unstable, certified, shells, runs, stuck, broken, nearest } = self;
+        let Tally { sets, unstable, certified, shells, runs, from_rest, single, corners, .. } = self;
+        let Tally { stuck, broken, nearest, nearest_from_rest, .. } = self;
         let open = sets - unstable - certified;
-        write!(f, "| {sets} | {unstable} | {open} | {certified} | {shells} | {runs} | {stuck} | {broken} ")?;
-        write!(f, "| {:.1} % |", 100.0 * nearest)
+        write!(f, "| {sets} | {unstable} | {open} | {certified} | {shells} | {runs} | {from_rest} ")?;
+        write!(f, "| {corners} | {single} | {stuck} | {broken} ")?;
+        write!(f, "| {:.1} %, {:.1} % |", 100.0 * nearest, 100.0 * nearest_from_rest)
     }
 }
 
 const TALLY: &str = "\
-| sets drawn | refused as unstable | not closed | certified | of these shells | runs | with sticks | broken bounds | nearest to its bound |
-|---|---|---|---|---|---|---|---|---|";
+| sets drawn | refused as unstable | not closed | certified | of these shells | runs | from rest | at a corner | in f32 | with sticks | broken bounds | nearest to its bound: in motion, from rest |
+|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 /// Random sets; those that are certified, and linearly stable or a shell, are run with random plants of their boxes. The
-/// line on the error output after each set is a result by itself; a campaign goes on from it at the seed that it names.
-fn campaign(drawn: Drawn, wanted: u64, first: u64) -> Outcome<()> {
+/// line on the error output after each set is a result by itself; a campaign goes on from it at the seed that it names. Half of
+/// the runs are from rest: a set of a start of which a share has enough runs is passed over.
+fn campaign(drawn: Drawn, wanted: u64, first_seeds: &[u64]) -> Outcome<()> {
+    let wanted = wanted.div_ceil(first_seeds.len() as u64);
     let mut tally = Tally::default();
-    let mut seed = first;
-    while tally.runs < wanted {
-        seed += 1;
-        a_set(drawn, seed, &mut tally)?;
-        eprintln!("{tally} next seed {seed}");
+    for first in first_seeds {
+        let (mut share, mut seed) = (Tally::default(), *first);
+        while share.runs < wanted {
+            seed += 1;
+            a_set(drawn, seed, wanted, &mut share)?;
+            eprintln!("{share} next seed {seed}");
+        }
+        tally = tally.with(&share);
     }
     println!("{TALLY}\n{tally}");
     if tally.broken > 0 { Err("bounds are broken".into()) } else { Ok(()) }
@@ -526,11 +620,16 @@ fn campaign(drawn: Drawn, wanted: u64, first: u64) -> Outcome<()> {
 const RUNS_OF_A_SET: u64 = 200;
 
 /// Draws a set; if it is certified, runs it with random plants of its box.
-fn a_set(drawn: Drawn, seed: u64, tally: &mut Tally) -> Outcome<()> {
+fn a_set(drawn: Drawn, seed: u64, wanted: u64, tally: &mut Tally) -> Outcome<()> {
     let work = if drawn == Drawn::Integral { Options::default().work } else { 300_000_000 };
     let options = Options { refinements: 0, work, ..Options::default() };
-    tally.sets += 1;
     let scenario = draw(drawn, &mut Pcg64::seed_from_u64(seed))?;
+    let rest = scenario.spec().run.start == Start::Rest;
+    let of_this_start = if rest { tally.from_rest } else { tally.runs - tally.from_rest };
+    if 2 * of_this_start >= wanted {
+        return Ok(());
+    }
+    tally.sets += 1;
     let sampled = scenario.sampled(&scenario.plan()?.bounds);
     if !sampled.bound_suffices() {
         tally.unstable += 1;
@@ -546,9 +645,16 @@ fn a_set(drawn: Drawn, seed: u64, tally: &mut Tally) -> Outcome<()> {
     tally.certified += 1;
     tally.shells += u64::from(shell);
     for k in 0..RUNS_OF_A_SET {
-        let (error, sticks) = run(&scenario, &setup, 2.0, 1000 * seed + k)?;
+        // Each place in both scalars, with every bad law: of those there are seven.
+        let place = if k % 2 == 0 { Place::Corner } else { Place::Within };
+        let trial = Trial { seconds: 2.0, seed: 1000 * seed + k, place, single: k / 2 % 2 == 1 };
+        let (error, sticks) = run(&scenario, &setup, &trial)?;
         tally.runs += 1;
-        tally.nearest = tally.nearest.max(error / bound);
+        tally.from_rest += u64::from(rest);
+        tally.corners += u64::from(place == Place::Corner);
+        tally.single += u64::from(trial.single);
+        let nearest = if rest { &mut tally.nearest_from_rest } else { &mut tally.nearest };
+        *nearest = nearest.max(error / bound);
         tally.stuck += u64::from(sticks > 0.0);
         if error > bound {
             tally.broken += 1;
@@ -566,19 +672,24 @@ fn main() -> Outcome<()> {
         Some("table") => table(&words.next().unwrap_or_default()),
         Some("integral") => sets(&INTEGRALS, "K_p, K_i, K_d, K_Kal"),
         Some("shell") => sets(&SHELLS, "f, S, K_Kal"),
-        Some("motor") => sets(&MOTORS, "law"),
+        Some("rates") => sets(&RATES, ANY_LAW),
+        Some("motor") => sets(&MOTORS, ANY_LAW),
         Some(name @ ("campaign" | "campaign-integral" | "campaign-motor")) => {
             let drawn = match name {
                 "campaign" => Drawn::Any,
                 "campaign-integral" => Drawn::Integral,
                 _ => Drawn::Motor,
             };
-            let mut number = |default: u64| words.next().map_or(Ok(default), |word| word.parse());
-            campaign(drawn, number(10_000)?, number(0)?)
+            let numbers = words.map(|word| word.parse()).collect::<Result<Vec<u64>, _>>()?;
+            match numbers.as_slice() {
+                [] => campaign(drawn, 10_000, &[0]),
+                [runs] => campaign(drawn, *runs, &[0]),
+                [runs, first_seeds @ ..] => campaign(drawn, *runs, first_seeds),
+            }
         }
         _ => {
-            let verbs = "table [SET], integral, shell, motor, or campaign, campaign-integral or campaign-motor \
-                 [RUNS] [FIRST_SEED]";
+            let verbs = "table [SET], integral, shell, rates, motor, or campaign, campaign-integral or campaign-motor \
+                 [RUNS [FIRST_SEED …]]";
             Err(format!("expected {verbs}").into())
         }
     }
