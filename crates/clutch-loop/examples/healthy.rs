@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         periods += report.answers;
         runs += 1;
         let cause = report.cause.map_or("went on".to_owned(), |c| format!("{c:?}"));
-        if report.cause.is_some_and(|c| is_nuisance(c)) {
+        if report.cause.is_some_and(is_nuisance) {
             nuisance += 1;
             eprintln!("FAILED: seed {}: {cause} after {} periods", run.seed, report.answers);
         }
