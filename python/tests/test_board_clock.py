@@ -1,7 +1,7 @@
 """Boards in real time whose clock is wrong, against the real `clutch loop`: refused before consent, in both roles.
 
 The board shares no code with the product (lying_board.py, docs/wire.md). Its serial number is that of no simulated
-board, so that the loop holds its clock against the machine's.
+board, but where a test gives it one: then its clock may be slow to a half.
 """
 
 import re
@@ -21,10 +21,8 @@ SETTINGS = int(re.search(r"settings, hash `0x([0-9a-f]+)`", WIRE.read_text(encod
 class RealBoard(lying_board.Board):
     """A board whose time passes with the machine's, at a rate, and which samples at another. Nobody may drive it."""
 
-    serial = 4711
-
-    def __init__(self, path, time_rate, sample_rate, controller):
-        self.stamp = None
+    def __init__(self, path, time_rate, sample_rate, controller, serial):
+        self.stamp, self.serial = None, serial
         super().__init__(lying_board.LIES[0], 1, path)
         self.time_rate, self.period, self.controller = time_rate, lying_board.PERIOD / sample_rate, controller
         self.began, self.asked_at, self.due = time.monotonic(), None, None
@@ -74,18 +72,18 @@ class RealBoard(lying_board.Board):
         self.catch_up()
 
 
-def meet(clutch, time_rate, sample_rate, controller):
+def meet(clutch, time_rate, sample_rate, controller, serial=4711, options=()):
     """A loop meets a board: the board, and what the loop says."""
     with tempfile.TemporaryDirectory() as folder:
         scenario, port = Path(folder, "clock.toml"), Path(folder, "port")
         text = lying_board.SCENARIO.format(law="smc", rate=20.0, hold=6.7)
         scenario.write_text(text, encoding="utf-8")
-        board = RealBoard(port, time_rate, sample_rate, controller)
+        board = RealBoard(port, time_rate, sample_rate, controller, serial)
         thread = threading.Thread(target=board.serve, daemon=True)
         thread.start()
         role = "--board" if controller else "--port"
         arguments = ["loop", scenario, role, f"unix://{port}", "--uncertified", "--thread-priority", "0"]
-        done = clutch(*arguments, "--lock-memory", "false", code=None)
+        done = clutch(*arguments, "--lock-memory", "false", *options, code=None)
         thread.join(10)
     if board.failure:
         raise board.failure
@@ -122,3 +120,37 @@ def test_a_board_that_is_right_is_asked_to_drive_soon(clutch, drift, controller)
     board, done = meet(clutch, drift, drift, controller)
     assert board.armed_at is not None, done.stdout + done.stderr
     print(f"consent {1e3 * (board.armed_at - board.asked_at):.0f} ms after the configuration")
+
+
+@pytest.mark.parametrize("serial", [0, 1])
+@pytest.mark.parametrize("rate", [1 / 155, 0.4, 1.2, 12.0])
+def test_a_board_that_calls_itself_simulated_is_refused_at_a_rate_that_no_slip_explains(clutch, rate, serial):
+    board, done = meet(clutch, 1.0, rate, controller=False, serial=serial)
+    assert done.returncode not in (0, 3) and board.armed_at is None, done.stderr
+    said = re.search(r"takes ([0-9.]+) samples a second .*, expected 500 to 1050 of one whose serial", done.stderr)
+    assert said and float(said[1]) == pytest.approx(1000 * rate, rel=0.05, abs=5), done.stderr
+
+
+@pytest.mark.parametrize("serial", [0, 1])
+@pytest.mark.parametrize("controller", [False, True])
+@pytest.mark.parametrize("rate", [0.4, 1.2, 0.0, -1.0])
+def test_a_board_that_calls_itself_simulated_is_refused_with_a_time_that_no_slip_explains(
+    clutch, rate, controller, serial
+):
+    board, done = meet(clutch, rate, 1.0, controller, serial)
+    assert done.returncode not in (0, 3) and board.armed_at is None, done.stderr
+    said = re.search(r"time_us passes (-?[0-9.]+) times as fast .* expected 0.5 to 1.05 of one whose", done.stderr)
+    assert said and float(said[1]) == pytest.approx(rate, rel=0.05, abs=0.01), done.stderr
+
+
+@pytest.mark.parametrize("serial", [0, 1])
+@pytest.mark.parametrize("controller", [False, True])
+@pytest.mark.parametrize("rate", [0.6, 0.9, 1.0])
+def test_a_board_that_calls_itself_simulated_may_slip(clutch, rate, controller, serial):
+    board, done = meet(clutch, rate, rate, controller, serial)
+    assert board.armed_at is not None, done.stdout + done.stderr
+
+
+def test_a_clock_that_may_wait_by_an_option_of_the_host_is_not_judged(clutch):
+    board, done = meet(clutch, 1.2, 1.2, controller=False, serial=0, options=["--patient"])
+    assert board.armed_at is not None, done.stdout + done.stderr

@@ -5,11 +5,18 @@
 //! machine or a slow line held each of them up: a board that is right is never refused, and a look that says little is
 //! followed by another. A board may itself be held up between an answer and a sample; so it is believed soon, and refused
 //! only after a second, of which that is no share.
+//!
+//! A simulated board's clock slips behind where its machine stalls, and never runs ahead. Of a board that calls itself one it
+//! is refused what no slip explains: a rate that is too high, or below a half. Its word alone would leave a real board behind
+//! a socket unlooked at.
 
 use clutch_core::Micros;
+use clutch_sim::number;
 
 /// Share by which the board's rate may differ from this machine's.
 const TOLERANCE: f64 = 0.05;
+/// Share that is left of the rate of a clock that slips, at least.
+const SLIPPED: f64 = 0.5;
 /// Looks that a board is believed by have so much time between them, ns: its clock may tick in milliseconds.
 const NEAR_NS: u64 = 50_000_000;
 /// Looks that a board is refused by, ns.
@@ -44,15 +51,15 @@ impl Rate {
         self.high = self.high.min(if high > 0.0 { high / shortest } else { high / longest });
     }
 
-    /// True if it cannot be right.
-    fn is_wrong(self) -> bool {
-        self.low > 1.0 + TOLERANCE || self.high < 1.0 - TOLERANCE
+    /// True if it cannot be right, where it has to be at least this.
+    fn is_wrong(self, least: f64) -> bool {
+        self.low > 1.0 + TOLERANCE || self.high < least
     }
 
     /// True if it can only be right.
-    fn is_right(self) -> bool {
+    fn is_right(self, least: f64) -> bool {
         // Of a rate that is none, nothing is known.
-        self.low >= 1.0 - TOLERANCE && self.high <= 1.0 + TOLERANCE && self.low <= self.high
+        self.low >= least && self.high <= 1.0 + TOLERANCE && self.low <= self.high
     }
 
     /// The middle of its bounds, or the bound that there is.
@@ -71,6 +78,34 @@ pub enum Wrong {
     Samples(f64),
 }
 
+/// What is expected of a board's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// Its period.
+    pub period: Micros,
+    /// It may slip behind: the board calls itself simulated.
+    pub slips: bool,
+}
+
+impl Expected {
+    /// The lowest rate, in parts of that which it should have.
+    fn least(self) -> f64 {
+        if self.slips { SLIPPED } else { 1.0 - TOLERANCE }
+    }
+
+    /// Samples or seconds that are right, so many by this machine's clock, in words.
+    #[must_use]
+    pub fn words(self, right: f64) -> String {
+        let text = |x: f64| number((x * 1e3).round() / 1e3);
+        if self.slips {
+            let (least, most) = (text(right * SLIPPED), text(right * (1.0 + TOLERANCE)));
+            format!("{least} to {most} of one whose serial number is a simulated board's")
+        } else {
+            format!("{} to 5 %", text(right))
+        }
+    }
+}
+
 /// A rate by looks that are near, and by those that are far apart.
 #[derive(Clone, Copy, Debug)]
 struct Rates {
@@ -81,7 +116,7 @@ struct Rates {
 /// A board's clock by this machine's.
 #[derive(Clone, Debug)]
 pub struct BoardClock {
-    period: f64,
+    expected: Expected,
     /// Its samples come here.
     samples_come: bool,
     looks: Vec<Look>,
@@ -90,12 +125,11 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
-    /// Clock of a board that is to sample with this period; its samples come to this machine, or to another.
+    /// Clock of a board of which this is expected; its samples come to this machine, or to another.
     #[must_use]
-    pub fn new(period: Micros, samples_come: bool) -> Self {
+    pub fn new(expected: Expected, samples_come: bool) -> Self {
         let unknown = Rates { near: Rate::UNKNOWN, far: Rate::UNKNOWN };
-        let period = f64::from(period.0) * 1e-6;
-        BoardClock { period, samples_come, looks: Vec::new(), time: unknown, samples: unknown }
+        BoardClock { expected, samples_come, looks: Vec::new(), time: unknown, samples: unknown }
     }
 
     /// Takes a look in, later than those before. True if board and machine agree as far as can be seen, false if nobody can
@@ -106,6 +140,7 @@ impl BoardClock {
     pub fn look(&mut self, look: Look) -> Result<bool, Wrong> {
         let seconds = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-9;
         let (asked, answered) = look.asked_ns;
+        let (period, least) = (f64::from(self.expected.period.0) * 1e-6, self.expected.least());
         for before in &self.looks {
             let apart = asked.saturating_sub(before.asked_ns.1);
             if apart < NEAR_NS {
@@ -122,8 +157,8 @@ impl BoardClock {
             let narrow = |time: &mut Rate, samples: &mut Rate| {
                 time.narrow((by_the_board, by_the_board), passed);
                 if let Some(taken) = taken {
-                    let (least, most) = (taken - OVERTAKEN, taken + OVERTAKEN);
-                    samples.narrow((least * self.period, most * self.period), passed);
+                    let (fewest, most) = (taken - OVERTAKEN, taken + OVERTAKEN);
+                    samples.narrow((fewest * period, most * period), passed);
                 }
             };
             narrow(&mut self.time.near, &mut self.samples.near);
@@ -132,13 +167,13 @@ impl BoardClock {
             }
         }
         self.looks.push(look);
-        if self.samples_come && self.samples.far.is_wrong() {
+        if self.samples_come && self.samples.far.is_wrong(least) {
             return Err(Wrong::Samples(self.samples.far.seen()));
         }
-        if self.time.far.is_wrong() {
+        if self.time.far.is_wrong(least) {
             return Err(Wrong::Time(self.time.far.seen()));
         }
-        Ok(self.time.near.is_right() && (!self.samples_come || self.samples.near.is_right()))
+        Ok(self.time.near.is_right(least) && (!self.samples_come || self.samples.near.is_right(least)))
     }
 }
 
@@ -148,16 +183,29 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
+    const STRICT: Expected = Expected { period: Micros(1000), slips: false };
+
     /// Looks, 5 ms apart, at a board whose time and samples run at these rates, over a line that holds each way up by a random
     /// time below `held_up_ms`. Gives the verdict and when it fell, ms; none within two seconds.
     fn verdict(
-        (time, samples): (f64, f64),
+        rates: (f64, f64),
         period_us: u32,
         held_up_ms: f64,
         seed: u64,
     ) -> (Option<Result<(), Wrong>>, f64) {
+        let expected = Expected { period: Micros(period_us), slips: false };
+        verdict_of(expected, rates, held_up_ms, seed)
+    }
+
+    fn verdict_of(
+        expected: Expected,
+        (time, samples): (f64, f64),
+        held_up_ms: f64,
+        seed: u64,
+    ) -> (Option<Result<(), Wrong>>, f64) {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let mut clock = BoardClock::new(Micros(period_us), true);
+        let period_us = expected.period.0;
+        let mut clock = BoardClock::new(expected, true);
         let mut now = 1e9;
         // Not in step with the samples.
         let start = 1e9 - 1e6 * rng.random_range(0.0..1.0);
@@ -237,17 +285,45 @@ mod tests {
             board_us: ms as u32 * 1000,
             sample,
         };
-        let mut clock = BoardClock::new(Micros(1000), true);
+        let mut clock = BoardClock::new(STRICT, true);
         for ms in (0..2000).step_by(5) {
             let late = if (40..70).contains(&ms) { 30 } else { 0 };
             assert!(clock.look(look(ms, Some(100 + ms as u16 - late))).is_ok(), "at {ms} ms");
         }
-        let mut clock = BoardClock::new(Micros(1000), true);
+        let mut clock = BoardClock::new(STRICT, true);
         let said = (0..2000).step_by(5).map(|ms| clock.look(look(ms, None))).find(|said| *said != Ok(false));
         assert!(matches!(said, Some(Err(Wrong::Samples(seen))) if seen < 0.01), "{said:?}");
         // They go to another machine.
-        let mut clock = BoardClock::new(Micros(1000), false);
+        let mut clock = BoardClock::new(STRICT, false);
         assert!((0..100).step_by(5).any(|ms| clock.look(look(ms, None)) == Ok(true)));
+    }
+
+    #[test]
+    fn a_clock_that_may_slip_is_refused_where_it_runs_ahead_or_at_less_than_half_its_rate() {
+        let slips = Expected { period: Micros(1000), slips: true };
+        for seed in 0..50 {
+            for held_up_ms in [0.3, 10.0] {
+                for rate in [0.6, 0.9, 1.0, 1.01] {
+                    for rates in [(rate, rate), (1.0, rate), (rate, 1.0)] {
+                        let (said, ms) = verdict_of(slips, rates, held_up_ms, seed);
+                        assert!(said == Some(Ok(())), "{rates:?}: {said:?} after {ms} ms");
+                    }
+                }
+                for rate in [-1.0, 0.0, 1.0 / 155.0, 0.4, 1.1, 1.2, 2.0, 12.0] {
+                    let (said, ms) = verdict_of(slips, (rate, 1.0), held_up_ms, seed);
+                    assert!(matches!(said, Some(Err(Wrong::Time(_)))), "{rate}: {said:?} after {ms} ms");
+                    let (said, ms) = verdict_of(slips, (1.0, rate.max(0.0)), held_up_ms, seed);
+                    assert!(matches!(said, Some(Err(Wrong::Samples(_)))), "{rate}: {said:?} after {ms} ms");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_rates_that_are_right_are_told() {
+        let words = |slips| Expected { period: Micros(1000), slips }.words(1000.0);
+        assert_eq!(words(false), "1000 to 5 %");
+        assert_eq!(words(true), "500 to 1050 of one whose serial number is a simulated board's");
     }
 
     #[test]

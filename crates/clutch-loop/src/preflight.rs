@@ -1,12 +1,11 @@
 //! Before a run: who is on the line, and does it fit.
 
-use crate::board_clock::{BoardClock, Look, Wrong};
+use crate::board_clock::{BoardClock, Expected, Look, Wrong};
 use crate::build_error::BuildError;
 use crate::cause_words::why;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};
-use clutch_core::Micros;
 use clutch_node::{Notice, Outbox};
 use clutch_settings::Settings;
 use clutch_sim::number;
@@ -148,7 +147,7 @@ pub enum PreflightError {
     },
     /// The board samples at another rate than the scenario's.
     #[error(
-        "{address}: the board takes {seen} samples a second by this machine's clock, expected {expected} to 5 % \
+        "{address}: the board takes {seen} samples a second by this machine's clock, expected {expected} \
          (sampling.period_us = {period}). Every velocity would be wrong by as much: correct the board's crystal, prescaler or timer"
     )]
     SampleRate {
@@ -156,14 +155,14 @@ pub enum PreflightError {
         address: String,
         /// Samples a second.
         seen: String,
-        /// Those of the scenario.
+        /// Those that are right for the scenario, in words.
         expected: String,
         /// The scenario's period, µs.
         period: u32,
     },
     /// The board's time passes at another rate than ours.
     #[error(
-        "{address}: the board's time_us passes {seen} times as fast as this machine's clock, expected 1 to 5 %. Correct the \
+        "{address}: the board's time_us passes {seen} times as fast as this machine's clock, expected {expected}. Correct the \
          board's crystal or prescaler"
     )]
     TimeRate {
@@ -171,6 +170,8 @@ pub enum PreflightError {
         address: String,
         /// The rate.
         seen: String,
+        /// The rates that are right, in words.
+        expected: String,
     },
     /// The board stopped answering.
     #[error(
@@ -349,14 +350,14 @@ impl<'a, S: Station> Talk<'a, S> {
     }
 
     /// The board's clock against ours: the request with the shortest round trip of some. Where `judged` is given, the
-    /// scenario's period, the board's time and its samples have to pass as they should, as far as that can be known within
-    /// two seconds: [`BoardClock`].
+    /// board's time and its samples have to pass as is expected there, as far as that can be known within two seconds:
+    /// [`BoardClock`].
     ///
     /// # Errors
     /// The board is silent, or its clock is wrong.
-    pub fn clock(&mut self, judged: Option<Micros>) -> Result<ClockOffset, PreflightError> {
+    pub fn clock(&mut self, judged: Option<Expected>) -> Result<ClockOffset, PreflightError> {
         let mut best: Option<ClockOffset> = None;
-        let mut clock = judged.map(|period| BoardClock::new(period, !S::LOOKS_ON));
+        let mut clock = judged.map(|expected| BoardClock::new(expected, !S::LOOKS_ON));
         let mut sent = Vec::new();
         let (mut newest, mut agrees) = (None, judged.is_none());
         let until = monotonic_ns() + LONGEST_LOOK_NS;
@@ -382,24 +383,26 @@ impl<'a, S: Station> Talk<'a, S> {
             if best.is_none_or(|b| offset.round_trip_us < b.round_trip_us) {
                 best = Some(offset);
             }
-            if let Some((clock, period)) = clock.as_mut().zip(judged) {
+            if let Some((clock, expected)) = clock.as_mut().zip(judged) {
                 let look = Look { asked_ns: (sent, received), board_us, sample: newest };
-                agrees = clock.look(look).map_err(|wrong| self.wrong_clock(wrong, period))?;
+                agrees = clock.look(look).map_err(|wrong| self.wrong_clock(wrong, expected))?;
                 std::thread::sleep(BETWEEN_LOOKS);
             }
         }
         best.ok_or_else(|| PreflightError::Lost { address: self.address(), what: "asked for its time" })
     }
 
-    fn wrong_clock(&self, wrong: Wrong, Micros(period): Micros) -> PreflightError {
-        let address = self.address();
+    fn wrong_clock(&self, wrong: Wrong, of: Expected) -> PreflightError {
+        let (address, period) = (self.address(), of.period.0);
         let rounded = |x: f64| number((x * 1e3).round() / 1e3);
         match wrong {
-            Wrong::Time(rate) => PreflightError::TimeRate { address, seen: rounded(rate) },
+            Wrong::Time(rate) => {
+                PreflightError::TimeRate { address, seen: rounded(rate), expected: of.words(1.0) }
+            }
             Wrong::Samples(rate) => {
-                let expected = 1e6 / f64::from(period);
-                let seen = rounded(rate * expected);
-                PreflightError::SampleRate { address, seen, expected: rounded(expected), period }
+                let right = 1e6 / f64::from(period);
+                let seen = rounded(rate * right);
+                PreflightError::SampleRate { address, seen, expected: of.words(right), period }
             }
         }
     }

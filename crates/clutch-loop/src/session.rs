@@ -4,6 +4,7 @@
 //! who it is, says what it will do, makes a release test where that is asked for, configures and arms the board, runs to
 //! the path's end, and leaves the board in its safe state. Starting it is the consent.
 
+use crate::board_clock::Expected;
 use crate::board_words::{board_text, controller_text, is_simulated, start_notes, started_text};
 use crate::build_error::BuildError;
 use crate::campaign::CampaignError;
@@ -467,9 +468,9 @@ impl Course<'_> {
         let present = present_code(hello, built.supervisor.safe_codes().hold);
         let (gains, changes) = self.tuning(scenario, &built, receivers);
         let log = self.log(&built, present, &board_text(hello), receivers, gains)?;
-        let judged = self.has_a_clock(hello, port);
+        let judged = self.expected(hello, port, built.servo.period());
         let mut talk = Talk::new(port, &mut station);
-        let ready = talk.configure(present).and_then(|()| talk.clock(judged.then_some(built.servo.period())));
+        let ready = talk.configure(present).and_then(|()| talk.clock(judged));
         let (log, clock) = log.of_a_run(ready)?;
         let configured = ConfiguredRun {
             station: &mut station,
@@ -528,12 +529,10 @@ impl Course<'_> {
         let hold = built.supervisor.safe_codes().hold;
         let board = met.map_or_else(String::new, controller_text) + &started_text(hello);
         let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
-        let judged = self.has_a_clock(hello, port);
+        let judged = self.expected(hello, port, built.servo.period());
         let mut talk = Talk::new(port, &mut station);
-        let ready = talk
-            .upload(&settings)
-            .and_then(|()| talk.configure(hold))
-            .and_then(|()| talk.clock(judged.then_some(built.servo.period())));
+        let ready =
+            talk.upload(&settings).and_then(|()| talk.configure(hold)).and_then(|()| talk.clock(judged));
         let (log, clock) = log.of_a_run(ready)?;
         let configured = ConfiguredRun {
             station: &mut station,
@@ -597,10 +596,13 @@ impl Course<'_> {
         Err(PreflightError::Misfit { address: self.address.to_string(), lines })
     }
 
-    /// True if the board's clock is to be held against this machine's: that of a simulated board stands still where this
-    /// machine stalls, and a real port's board is never taken for one.
-    fn has_a_clock(&self, hello: &Hello, port: &Port) -> bool {
-        !self.session.patient() && (is_real(port) || !is_simulated(hello))
+    /// What is expected of the board's clock by this machine's; nothing where it may wait, or where the simulation is our
+    /// own. A board that only calls itself simulated may slip, as a simulated one does where its machine stalls, and no more:
+    /// behind a socket it may be a real one. At a real port it is never taken for one.
+    fn expected(&self, hello: &Hello, port: &Port, period: Micros) -> Option<Expected> {
+        let ours = matches!(self.session.options.board, Board::Simulated { .. });
+        let judged = !self.session.patient() && !ours;
+        judged.then_some(Expected { period, slips: !is_real(port) && is_simulated(hello) })
     }
 
     /// A new run on a board with this clock: when the clock waits, so does our patience.
