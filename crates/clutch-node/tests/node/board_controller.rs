@@ -559,6 +559,26 @@ fn for_the_host_a_board_that_says_nothing_more_has_ended() {
 }
 
 #[test]
+fn a_host_does_not_believe_a_configuration_of_another_power_up_than_that_of_the_hello() {
+    let plan = Plan::new();
+    let heard = Desk::new(plan).says(discover());
+    let hello = heard.iter().find(|m| matches!(m, Message::ControllerHello(_))).unwrap();
+    let configured =
+        |boot| Message::Configured(Configured { run: plan.run, config: configure(&plan).config, boot });
+    let (right, wrong) = (BOARD_CONTROLLER.boot, BOARD_CONTROLLER.boot.wrapping_add(1));
+    // Nor one of whom nobody has heard.
+    for (met, boot, believed) in [(true, right, true), (true, wrong, false), (false, right, false)] {
+        let (mut host, mut notices) = (plan.host(), Vec::new());
+        for message in [met.then_some(hello), Some(&configured(boot))].into_iter().flatten() {
+            host.receive(0, encode(message).as_bytes(), &plan.path(), &mut |n| notices.push(n));
+        }
+        let other = matches!(notices.last(), Some(Notice::OtherBoot(m)) if m.boot == boot);
+        let ready = host.standing().state == State::Ready;
+        assert_eq!((ready, other), (believed, !believed), "{met}, {boot}: {notices:?}");
+    }
+}
+
+#[test]
 fn frames_of_another_run_are_ignored() {
     let mut desk = Desk::running(Plan::new());
     for message in [
