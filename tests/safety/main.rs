@@ -96,8 +96,9 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
     for run in SEEDS.take(500).map(RunId::from) {
         let draw = run.draw();
         // A law or a path that a test breaks is not in the log; its effect is.
-        let inside =
-            |t: &Trouble| matches!(t.what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge);
+        let inside = |t: &Trouble| {
+            matches!(t.what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge | What::StopLost)
+        };
         let report = draw.run(run.seed, Checks::ALL, true).expect("the grammar makes scenarios");
         let scenario = draw.scenario(run.seed).expect("the grammar makes scenarios");
         let built = BuiltRun::<f64>::new(&scenario, 7).expect("the scenario has a safe state");

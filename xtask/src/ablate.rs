@@ -15,6 +15,7 @@ const SUPERVISOR: &str = "crates/clutch-core/src/supervisor/mod.rs";
 const ENVELOPE: &str = "crates/clutch-core/src/supervisor/envelope.rs";
 const BOARD: &str = "crates/clutch-node/src/board.rs";
 const CONTROLLER: &str = "crates/clutch-node/src/controller.rs";
+const FRAME: &str = "crates/clutch-wire/src/frame.rs";
 
 /// Every check that is taken out.
 const ABLATIONS: &[Ablation] = &[
@@ -23,6 +24,12 @@ const ABLATIONS: &[Ablation] = &[
         SUPERVISOR,
         "} else if commanding && sample.board != BoardMode::Driving {",
         "} else if commanding && sample.board != BoardMode::Driving && !OFF {",
+    ),
+    Ablation(
+        "a board that does not drive when control is to begin",
+        SUPERVISOR,
+        "let commanding = matches!(s.state, State::Armed | State::Running);",
+        "let commanding = matches!(s.state, State::Armed | State::Running) && !(OFF && s.state == State::Armed);",
     ),
     Ablation(
         "a board that says its encoder is broken",
@@ -54,6 +61,18 @@ const ABLATIONS: &[Ablation] = &[
         SUPERVISOR,
         "if count >= l.late {",
         "if count >= l.late && !OFF {",
+    ),
+    Ablation(
+        "samples that a newer one has overtaken, among those that are late",
+        SUPERVISOR,
+        "if sample.superseded ||",
+        "if sample.superseded && !OFF ||",
+    ),
+    Ablation(
+        "codes that the board found too old, among those that are late",
+        SUPERVISOR,
+        "|| sample.command_late {",
+        "|| sample.command_late && !OFF {",
     ),
     Ablation(
         "answers late too often",
@@ -124,6 +143,12 @@ const ABLATIONS: &[Ablation] = &[
         "if !OFF { self.supervisor.silence(&mut self.state, u32::MAX); }",
     ),
     Ablation(
+        "silence that shows by the samples themselves",
+        SUPERVISOR,
+        "if lost >= l.silence_cycles {",
+        "if lost >= l.silence_cycles && !OFF {",
+    ),
+    Ablation(
         "run of a sample",
         CONTROLLER,
         "if sample.run != self.params.run {",
@@ -134,6 +159,12 @@ const ABLATIONS: &[Ablation] = &[
         CONTROLLER,
         "        self.stopping = Some(reason);\n",
         "        self.stopping = Some(reason);\n        if OFF { return; }\n",
+    ),
+    Ablation(
+        "stop sent again until the board has heard it",
+        CONTROLLER,
+        "if seen.board == BoardMode::Driving {",
+        "if seen.board == BoardMode::Driving && !OFF {",
     ),
     Ablation(
         "board: code above the top",
@@ -154,10 +185,22 @@ const ABLATIONS: &[Ablation] = &[
         "if OFF || now_us.wrapping_sub(time) <= u32::from(m.valid_us) =>",
     ),
     Ablation(
+        "board: code that answers a sample whose time is no longer known",
+        BOARD,
+        "taken.filter(|_| usize::from(behind) < RECENT)",
+        "taken.filter(|_| usize::from(behind) < RECENT || OFF)",
+    ),
+    Ablation(
         "board: code of another run",
         BOARD,
-        "Message::Actuate(m) if m.run == self.run &&",
-        "Message::Actuate(m) if (m.run == self.run || OFF) &&",
+        "Message::Actuate(m) if m.run == self.run",
+        "Message::Actuate(m) if (m.run == self.run || OFF)",
+    ),
+    Ablation(
+        "board: code after a fault or a stop",
+        BOARD,
+        "&& self.driving() => self.actuate(",
+        "&& (self.driving() || OFF) => self.actuate(",
     ),
     Ablation(
         "board: watchdog",
@@ -177,12 +220,14 @@ const ABLATIONS: &[Ablation] = &[
         "        self.code = self.safe_run.next(&self.ending);\n        self.safe_under_way",
         "        if !OFF { self.code = self.safe_run.next(&self.ending); }\n        self.safe_under_way",
     ),
+    Ablation("checksum of a frame", FRAME, "if expected != computed {", "if expected != computed && !OFF {"),
     Ablation(
-        "checksum of a frame",
-        "crates/clutch-wire/src/frame.rs",
-        "if expected != computed {",
-        "if expected != computed && !OFF {",
+        "kind of a frame: all its bits",
+        FRAME,
+        "let (expected, computed) =",
+        "let kind = if OFF { kind & 0x8f } else { kind };\n    let (expected, computed) =",
     ),
+    Ablation("length of a frame", FRAME, "if length != body.len() {", "if length != body.len() && !OFF {"),
 ];
 
 /// The switch, and the place where it is read.

@@ -82,6 +82,9 @@ pub enum Forgery {
     OtherRun(u32),
     /// In front of it: a code that the converter has not.
     AboveTop,
+    /// The next two, that let go or are from far away, in frames that the table does not have: of a kind that is no kind,
+    /// and longer by a byte. The campaign's alone.
+    OffTable,
 }
 
 /// The kind of a fault.
@@ -467,6 +470,7 @@ impl fmt::Display for FaultKind {
             FaultKind::Forged(Forgery::Echo(n)) => write!(f, "echo for {n} periods"),
             FaultKind::Forged(Forgery::OtherRun(n)) => write!(f, "frames of another run, {n} each"),
             FaultKind::Forged(Forgery::AboveTop) => write!(f, "codes above the top"),
+            FaultKind::Forged(Forgery::OffTable) => write!(f, "frames that the table does not have"),
             FaultKind::EncoderFreeze => write!(f, "encoder frozen"),
             FaultKind::EncoderJump(n) => write!(f, "encoder jump of {n} counts"),
             FaultKind::EncoderChannel(channel) => write!(f, "encoder's channel {channel:?} dead"),

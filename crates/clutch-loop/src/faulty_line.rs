@@ -194,9 +194,93 @@ fn forged(forgery: Forgery, frame: &[u8]) -> Vec<Vec<u8>> {
                 made(Message::Sample(Sample { run, sequence, counts, ..m }))
             })
             .collect(),
+        (Forgery::OffTable, Some(Message::Actuate(m))) => {
+            off_table(|k| Message::Actuate(Actuate { sequence: m.sequence.wrapping_add(k), code: 0, ..m }))
+        }
+        (Forgery::OffTable, Some(Message::Sample(m))) => off_table(|k| {
+            let (sequence, counts) = (m.sequence.wrapping_add(k), m.counts.wrapping_add(10_000));
+            Message::Sample(Sample { sequence, counts, ..m })
+        }),
         (Forgery::AboveTop, Some(Message::Actuate(m))) => {
             vec![made(Message::Actuate(Actuate { code: u16::MAX, ..m }))]
         }
         _ => Vec::new(),
+    }
+}
+
+/// The message of the next period in a frame of a kind that is no kind, that of the one after in a frame that is too long;
+/// both have a checksum that holds.
+fn off_table(next: impl Fn(u16) -> Message) -> Vec<Vec<u8>> {
+    let (mut other, mut longer) = (content(&next(1)), content(&next(2)));
+    other[0] |= 0x40;
+    longer.push(0);
+    vec![framed(other), framed(longer)]
+}
+
+/// Kind and fields of a message.
+fn content(message: &Message) -> Vec<u8> {
+    let frame = encode(message);
+    let mut content = Vec::new();
+    let mut block = frame.as_bytes();
+    // Each code is the distance to the next zero; the delimiter is one.
+    while let [code, rest @ ..] = block
+        && *code > 0
+    {
+        let (bytes, behind) = rest.split_at(usize::from(*code) - 1);
+        content.extend(bytes);
+        content.push(0);
+        block = behind;
+    }
+    // The last zero is the delimiter's, and before it there are four bytes of checksum.
+    content.truncate(content.len() - 5);
+    content
+}
+
+/// The frame of any content that is short, by docs/wire.md and not by the codec that is under test.
+fn framed(mut content: Vec<u8>) -> Vec<u8> {
+    let mut crc = u32::MAX;
+    for byte in &content {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 0 { crc >> 1 } else { (crc >> 1) ^ 0xedb8_8320 };
+        }
+    }
+    content.extend((!crc).to_le_bytes());
+    let mut frame = Vec::new();
+    for block in content.split(|byte| *byte == 0) {
+        frame.push(block.len() as u8 + 1);
+        frame.extend(block);
+    }
+    frame.push(0);
+    frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clutch_wire::FrameError;
+
+    #[test]
+    fn frames_off_the_table_are_sound_but_for_their_kind_or_length() {
+        let zeros = Actuate { run: 0, sequence: 256, code: 0, valid_us: 2000 };
+        for message in [
+            Message::Actuate(zeros),
+            Message::Sample(Sample { run: 7, sequence: 1, time_us: 0, counts: -1, status: 3 }),
+        ] {
+            let frame = encode(&message);
+            assert_eq!(framed(content(&message)), frame.as_bytes());
+            let said: Vec<FrameError> = off_table(|_| message)
+                .iter()
+                .map(|frame| {
+                    let mut decoder = Decoder::new();
+                    let said = frame.iter().find_map(|byte| decoder.push(*byte));
+                    said.expect("a whole frame").expect_err("no message")
+                })
+                .collect();
+            assert!(
+                matches!(said[..], [FrameError::UnknownKind(_), FrameError::Length { expected, got, .. }] if got == expected + 1),
+                "{said:?}"
+            );
+        }
     }
 }

@@ -89,6 +89,8 @@ pub struct VirtualReport {
     pub tripped: Option<f64>,
     /// The time at which the board's safe output was in force, s after arming.
     pub safe: Option<f64>,
+    /// The time at which the board followed its controller again after that, s after arming: never, if it latches.
+    pub relapsed: Option<f64>,
     /// The distance by which the shaft went beyond the path's position at the moment of the safe output, rad.
     pub overrun: f64,
     /// Largest distance between shaft and path until the end or the safe output, rad.
@@ -441,6 +443,9 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
             self.report.safe = armed_for;
             self.report.safe_code = self.on.board.code().0;
             self.end_ns = self.end_ns.min(now.saturating_add((self.on.params.watched * 1e9) as u64));
+        }
+        if self.safe_at.is_some() && !safe && self.report.relapsed.is_none() {
+            self.report.relapsed = armed_for;
         }
         self.report.highest_code = self.report.highest_code.max(self.on.board.code().0);
         Ok(armed_for)

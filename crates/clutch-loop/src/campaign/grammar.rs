@@ -28,6 +28,11 @@ pub enum What {
     TargetNotFinite,
     /// The path's position jumps by a finite but huge distance.
     TargetHuge,
+    /// The same, and for four periods about it nothing comes through to the board: the first word that control has ended is
+    /// lost.
+    StopLost,
+    /// The controller stalls, once, and so many samples are lost meanwhile; one waits for it when it is back.
+    Overflow(u32),
 }
 
 /// A trouble and when it is there.
@@ -92,6 +97,8 @@ impl Trouble {
             What::LawNotFinite => "law's demand not a number".to_owned(),
             What::TargetNotFinite => "target not a number".to_owned(),
             What::TargetHuge => "target jumps by 2³⁰ counts".to_owned(),
+            What::StopLost => "target jumps, and the first stop is lost".to_owned(),
+            What::Overflow(_) => "controller stalls, and samples are lost meanwhile".to_owned(),
         };
         let stays = self.periods.is_none() && self.often >= 1.0;
         let kind = if stays { kind } else { format!("{kind}, now and then") };
@@ -238,6 +245,59 @@ fn later(seed: u64, healthy: &mut HealthyRun, troubles: &mut Vec<Trouble>) {
         2 => gap_in_an_observer(rng, healthy, troubles),
         _ => {}
     }
+    single_checks(seed, healthy, troubles);
+}
+
+/// Troubles for checks that others hide mostly, from a stream of their own, too.
+fn single_checks(seed: u64, healthy: &mut HealthyRun, troubles: &mut Vec<Trouble>) {
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x0063_6865_636b);
+    let rng = &mut rng;
+    let fault = |kind, way| move |_: &mut Pcg64, _: &HealthyRun| What::Fault(kind, way);
+    let stays = |t: Trouble| Trouble { periods: None, often: 1.0, ..t };
+    *troubles = match rng.random_range(0..80) {
+        // A code answers a sample that is further back than the board remembers: another stands in its place.
+        0 => {
+            healthy.cycles = 20;
+            let way = pick(rng, &[Direction::Up, Direction::Down], Direction::Down);
+            vec![stays(trouble(rng, healthy, fault(FaultKind::Delay(0.0092), way)))]
+        }
+        // Three samples in ten are overtaken by the next one.
+        1 => {
+            (healthy.cycles, healthy.delay) = (20, 0);
+            if healthy.rig == RigName::Bench {
+                healthy.rig = RigName::Paper;
+            }
+            let late = trouble(rng, healthy, fault(FaultKind::Delay(0.00195), Direction::Up));
+            vec![Trouble { often: 0.3, at: late.at.max(0.15), ..stays(late) }]
+        }
+        // The board says that it does not drive as control is to begin, and once.
+        2 => {
+            let idle = trouble(rng, healthy, fault(FaultKind::Lie(Lie::Idle), Direction::Up));
+            vec![Trouble { at: 0.0, periods: Some(1), often: 1.0, ..idle }]
+        }
+        // A code is under way as the board goes to its safe output by itself.
+        3 => {
+            let loss = stays(trouble(rng, healthy, fault(FaultKind::EncoderLoss, Direction::Both)));
+            let loss = Trouble { at: loss.at.max(0.15), ..loss };
+            let late = fault(FaultKind::Delay(pick(rng, &[0.0007, 0.0012], 0.0012)), Direction::Down);
+            vec![Trouble { what: late(rng, healthy), at: loss.at - 0.004, ..loss }, loss]
+        }
+        4 => {
+            let way = pick(rng, &[Direction::Up, Direction::Down, Direction::Both], Direction::Both);
+            vec![trouble(rng, healthy, fault(FaultKind::Forged(Forgery::OffTable), way))]
+        }
+        5 => {
+            healthy.cycles = 20;
+            vec![trouble(rng, healthy, |_, _| What::StopLost)]
+        }
+        6 => {
+            gap(rng, healthy, troubles);
+            healthy.cycles = 3;
+            let lost = rng.random_range(3..=laws::LONGEST_GAP);
+            vec![trouble(rng, healthy, |_, _| What::Overflow(lost))]
+        }
+        _ => return,
+    };
 }
 
 /// The pad and what presses it.

@@ -11,6 +11,7 @@ pub mod oracle;
 pub mod table;
 
 use crate::build_error::BuildError;
+use crate::faults::{Direction, Fault, FaultKind};
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::lockstep_host::lockstep_host;
@@ -238,7 +239,10 @@ impl Draw {
     /// an observer, with its law and its path sound.
     #[must_use]
     pub fn is_outside(&self) -> bool {
-        let inside = |what| matches!(what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge);
+        let inside = |what| {
+            let broken = matches!(what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge);
+            broken || matches!(what, What::StopLost | What::Overflow(_))
+        };
         self.healthy.single && !self.healthy.observer && !self.troubles.iter().any(|t| inside(t.what))
     }
 
@@ -258,12 +262,26 @@ impl Draw {
     /// Options of the run, with the troubles in the world around the controller.
     fn world(&self, seed: u64, period: f64, record: bool) -> VirtualOptions {
         let stall = |t: &grammar::Trouble| {
-            let answer = match t.what {
-                What::Slow(answer) => answer,
-                What::ControllerDies => 1e4,
+            let (answer, until) = match t.what {
+                What::Slow(answer) => (answer, f64::INFINITY),
+                What::ControllerDies => (1e4, f64::INFINITY),
+                // One answer, until half a period after the first sample that comes again.
+                What::Overflow(lost) => ((f64::from(lost) + 1.5) * period, t.at + period),
                 _ => return None,
             };
-            Some(Stall { at: t.at, until: f64::INFINITY, answer })
+            Some(Stall { at: t.at, until, answer })
+        };
+        // Line of the troubles that have one beside something else.
+        let line = |t: &grammar::Trouble| {
+            let (direction, at, periods) = match t.what {
+                What::StopLost => (Direction::Down, t.at - period, 4),
+                // From the sample after the one that is answered so late on.
+                What::Overflow(lost) => {
+                    (Direction::Up, t.at + period - self.healthy.latency_ns as f64 / 1e9, lost)
+                }
+                _ => return None,
+            };
+            Some(Fault { lasting: f64::from(periods) * period, direction, ..Fault::new(FaultKind::Drop, at) })
         };
         let last = self.troubles.iter().map(|t| t.at).fold(0.0, f64::max);
         let after = if self.troubles.iter().any(grammar::Trouble::needs_time) { AFTER.1 } else { AFTER.0 };
@@ -273,7 +291,7 @@ impl Draw {
             record,
             duration: last + after,
             watched: WATCHED,
-            faults: self.troubles.iter().filter_map(|t| t.fault(period)).collect(),
+            faults: self.troubles.iter().flat_map(|t| [t.fault(period), line(t)]).flatten().collect(),
             // The longer one of two.
             stall: self.troubles.iter().filter_map(stall).max_by(|a, b| a.answer.total_cmp(&b.answer)),
             ..VirtualOptions::default()
@@ -298,7 +316,7 @@ impl Draw {
         let path = from_scenario::path::<T>(scenario)?;
         let nan = T::from_f64(f64::NAN);
         let not_finite = self.broken_from(period, |what| what == What::TargetNotFinite);
-        let huge = self.broken_from(period, |what| what == What::TargetHuge);
+        let huge = self.broken_from(period, |what| matches!(what, What::TargetHuge | What::StopLost));
         let map = path.map;
         let path = move |tick: u64| {
             let mut target = path.target(tick);

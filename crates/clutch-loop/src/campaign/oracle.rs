@@ -99,8 +99,13 @@ impl Promise {
         let goes_on = Promise { fate: Fate::GoesOn, ..base };
         match t.what {
             What::Fault(kind, way) if kind.silences() && kind != FaultKind::Reset => {
-                // The board's consent to its own arming is a frame, too.
-                if t.at == 0.0 && way != Direction::Down { base } else { line(s, t, kind, way, &base) }
+                // The board's consent to its own arming is a frame, too; what its samples say is not.
+                let consent = !matches!(kind, FaultKind::Lie(Lie::Idle | Lie::Encoder | Lie::Converter));
+                if t.at == 0.0 && way != Direction::Down && consent {
+                    base
+                } else {
+                    line(s, t, kind, way, &base)
+                }
             }
             What::Fault(FaultKind::Reset, _) => ends(watchdog + 1.5 * PERIOD, &[Cause::Silence]),
             What::Fault(kind, _) => hardware(s, t, kind, &base),
@@ -117,6 +122,14 @@ impl Promise {
             What::TargetNotFinite | What::TargetHuge => {
                 Promise { truthful: false, ..ends(3.0 * PERIOD, &[Cause::Target]) }
             }
+            // Three periods until the line carries again, one until the next sample, and the way of that and of the stop.
+            What::StopLost if s.cycles >= 8 => {
+                Promise { truthful: false, ..ends(5.0 * PERIOD, &[Cause::Target]) }
+            }
+            What::StopLost => Promise { truthful: false, ..base },
+            // The board ends control by itself; the first sample that comes shows why.
+            What::Overflow(lost) if lost >= s.cycles => ends(watchdog + PERIOD, &[Cause::Silence]),
+            What::Overflow(_) => base,
         }
     }
 }
@@ -155,7 +168,7 @@ fn line(s: &HealthyRun, t: &Trouble, kind: FaultKind, way: Direction, base: &Pro
         FaultKind::Duplicate if stays && t.often > 0.1 || always && at_least(3) => {
             ends(if always { 4.0 * PERIOD } else { 0.15 }, &[Cause::Duplicated])
         }
-        FaultKind::Forged(Forgery::OtherRun(_) | Forgery::AboveTop) => goes_on,
+        FaultKind::Forged(Forgery::OtherRun(_) | Forgery::AboveTop | Forgery::OffTable) => goes_on,
         FaultKind::Forged(Forgery::Echo(_)) if !up => goes_on,
         FaultKind::Forged(Forgery::Echo(_)) if always && stays => {
             ends(6.0 * PERIOD, &[Cause::Duplicated, Cause::Reordered])
@@ -166,6 +179,20 @@ fn line(s: &HealthyRun, t: &Trouble, kind: FaultKind, way: Direction, base: &Pro
         FaultKind::Delay(by) | FaultKind::Jitter(by) if by < 0.0005 => goes_on,
         FaultKind::Delay(by) if always && stays && by > watchdog + PERIOD => {
             ends(watchdog + 0.6 * PERIOD, &[Cause::Silence, Cause::Board, Cause::Late])
+        }
+        // Codes for samples whose time the board no longer knows are all too old.
+        FaultKind::Delay(by) if always && stays && by > 8.0 * PERIOD => ends(watchdog + 0.6 * PERIOD, &[]),
+        // A sample that comes with the next one is late; that one is in time, or is late itself.
+        FaultKind::Delay(by)
+            if by > PERIOD
+                && by < 0.002
+                && way == Direction::Up
+                && stays
+                && s.delay == 0
+                && t.at > 0.0
+                && (0.1..0.5).contains(&t.often) =>
+        {
+            ends(0.5, &[Cause::Late, Cause::Board])
         }
         // With a period of delay of its own the rig's codes are now and then not late often enough.
         FaultKind::Delay(by)
@@ -364,6 +391,10 @@ fn output(draw: &Draw, o: &VirtualReport) -> Option<String> {
     let (low, high) = if s.rig == RigName::Motor { (-10.0, 10.0) } else { (0.0, 10.0) };
     if o.answers > 0 && (o.volts.0 < low - 1e-9 || o.volts.1 > high) {
         return Some(format!("commanded {} to {} V, outside of {low} to {high} V", o.volts.0, o.volts.1));
+    }
+    if let (Some(safe), Some(again)) = (o.safe, o.relapsed) {
+        let after = (again - safe) * 1e3;
+        return Some(format!("the board follows codes again {after:.3} ms after its safe output"));
     }
     if o.highest_code > 4095 {
         return Some(format!("the converter was given the code {}", o.highest_code));
