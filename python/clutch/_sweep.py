@@ -279,7 +279,7 @@ def _scale(key: str, limits: Range) -> Callable[[float], float]:
     return lambda x: low * (high / low) ** x
 
 
-# Refused before memory is taken: at 20 µs a row these take minutes, and some GB.
+# Refused before memory is taken: these take some GB.
 _MOST_ROWS = 10_000_000
 
 

@@ -20,8 +20,10 @@ from clutch._units import attributes
 
 __all__ = ["SweptFile", "sweep_to_file"]
 
-#: Rows between two times that the file is written: at first, and at most.
-_ROWS = (256, 65_536)
+#: Rows between two times that the file is written: at first and at least, and at most.
+_ROWS = (16, 65_536)
+#: Bytes that a line of a sweep never has.
+_LONGEST = 1 << 20
 #: Time between two of them, s.
 _PAUSE_S = 1.0
 
@@ -152,7 +154,7 @@ def sweep_to_file(
             done += len(new)
             show(done)
             growth = _PAUSE_S / max(time.monotonic() - begun, 1e-3)
-            size = min(max(int(size * min(max(growth, 0.25), 4.0)), 16), _ROWS[1])
+            size = min(max(int(size * min(max(growth, 0.25), 4.0)), _ROWS[0]), _ROWS[1])
     if whole and done == len(chosen):
         _to_parquet(lines, out, scenario, chosen, names)
         lines.unlink()
@@ -240,8 +242,15 @@ class _Lines:
 
     def _whole_lines(self) -> Iterator[bytes]:
         with self._path.open("rb") as file:
-            # A kill may have cut off the last.
-            yield from (line for line in file if line.endswith(b"\n"))
+            for line in iter(lambda: file.readline(_LONGEST), b""):
+                if not line.endswith(b"\n"):
+                    if len(line) == _LONGEST:
+                        raise ValueError(
+                            f"{self._path}: has a line of more than {_LONGEST} bytes, as no sweep writes it; "
+                            "name another file"
+                        )
+                    return  # a kill has cut it off
+                yield line
 
 
 def _to_parquet(lines: Path, out: Path, scenario: Scenario, chosen: Samples, metrics: Sequence[str]) -> None:

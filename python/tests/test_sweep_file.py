@@ -88,6 +88,9 @@ def test_a_file_of_another_sweep_is_refused_and_stays(short, tmp_path, change, m
     (tmp_path / "none.csv").write_bytes(b"")
     with pytest.raises(ValueError, match="no header"):
         clutch.sweep_to_file(tmp_path / "none.csv", short, parameters, resume=True)
+    (tmp_path / "no_lines.csv").write_bytes(b"x" * 3_000_000)
+    with pytest.raises(ValueError, match="a line of more than 1048576 bytes"):
+        clutch.sweep_to_file(tmp_path / "no_lines.csv", short, parameters, resume=True)
 
 
 def test_a_parquet_file_that_is_cut_off_while_it_is_made_is_made_again(short, tmp_path, monkeypatch):

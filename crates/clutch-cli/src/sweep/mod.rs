@@ -58,8 +58,8 @@ pub(crate) struct SweepVerb {
     threads: Option<NonZeroUsize>,
 }
 
-/// Rows between two times that the file is written: at first, and at most.
-const CHUNK: (u64, u64) = (64, 65_536);
+/// Most rows between two times that the file is written.
+const CHUNK: u64 = 65_536;
 /// Time between two of them, s.
 const PAUSE_S: f64 = 1.0;
 /// Rows of the whole grid that are tried where the first are all refused.
@@ -376,9 +376,9 @@ impl SweepVerb {
             return Ok(Exit::Stopped);
         };
         let wrong = || format!("{}: cannot be written", out.display());
-        // Each thread has a vector's rows.
-        let least = (8 * threads as u64).min(CHUNK.1);
-        let (mut rows, mut chunk) = (before, CHUNK.0.max(least));
+        // At first, and at least: each thread has a vector's rows.
+        let least = (8 * threads as u64).min(CHUNK);
+        let (mut rows, mut chunk) = (before, least);
         let done = with_progress("rows", |progress| -> anyhow::Result<bool> {
             if before > 0 {
                 let _ = progress(Progress { total: grid.rows, finished: before });
@@ -412,7 +412,7 @@ impl SweepVerb {
                     return Ok(false);
                 }
                 let growth = (PAUSE_S / begun.elapsed().as_secs_f64().max(1e-3)).clamp(0.25, 4.0);
-                chunk = ((chunk as f64 * growth) as u64).clamp(least, CHUNK.1);
+                chunk = ((chunk as f64 * growth) as u64).clamp(least, CHUNK);
             }
             Ok(true)
         })?;
