@@ -184,20 +184,29 @@ fn a_board_that_its_watchdog_has_reset_is_announced_so() {
 #[test]
 fn a_board_gets_no_patience_for_its_serial_number() {
     let _alone = alone();
-    // It falls silent with the first sample after consent.
-    let device = answering(|message| {
+    // Its clock is right, and it falls silent with the first sample after consent.
+    let (mut since, mut taken) = (Instant::now(), 0_u16);
+    let device = answering(move |message| {
         let sample = |run, sequence, status| {
             Message::Sample(Sample { run, sequence, time_us: 1000 * u32::from(sequence), counts: 0, status })
         };
         match message {
             Message::Discover(m) => vec![Message::Hello(Hello { board: 0, boot_code: 2970, ..hello(m) })],
-            Message::Configure(m) => vec![
-                Message::Configured(Configured { run: m.run, config: m.config, boot: 1 }),
-                sample(m.run, 0, 1),
-            ],
-            Message::Ping(m) => vec![Message::Pong(Pong { run: m.run, nonce: m.nonce, time_us: 0 })],
+            Message::Configure(m) => {
+                (since, taken) = (Instant::now(), 1);
+                vec![
+                    Message::Configured(Configured { run: m.run, config: m.config, boot: 1 }),
+                    sample(m.run, 0, 1),
+                ]
+            }
+            Message::Ping(m) => {
+                let time_us = since.elapsed().as_micros() as u32;
+                let before = std::mem::replace(&mut taken, (time_us / 1000) as u16 + 1);
+                let pong = Message::Pong(Pong { run: m.run, nonce: m.nonce, time_us });
+                (before..taken).map(|n| sample(m.run, n, 1)).chain([pong]).collect()
+            }
             Message::Arm(m) => {
-                vec![Message::Armed(Armed { run: m.run, config: m.config }), sample(m.run, 1, 2)]
+                vec![Message::Armed(Armed { run: m.run, config: m.config }), sample(m.run, taken, 2)]
             }
             _ => Vec::new(),
         }
