@@ -84,7 +84,9 @@ pub(super) fn runs(
         ("rig.friction.stribeck.stribeck_velocity_rad_s", axis.stribeck),
     ];
     keys.extend_from_slice(more);
-    runs_of(&format!("{AXIS}\n{law}\n\n{path}\n"), &keys, seeds)
+    let found = runs_of(&format!("{AXIS}\n{law}\n\n{path}\n"), &keys, seeds)?;
+    let finite = |m: &Metrics| m.max_error_rad.is_finite() && m.control_variation_v_s.is_finite();
+    if found.iter().all(finite) { Ok(found) } else { Err(format!("a figure is no number: {law}").into()) }
 }
 
 /// Candidates of the search, and discs that they are tried on.
