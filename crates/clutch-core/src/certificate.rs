@@ -675,4 +675,32 @@ mod tests {
         // The weight and friction take 0.047 + 0.02 N m of 0.05 N m/V.
         assert_eq!((shortfall(-10.0), shortfall(-1.2)), (None, Some(Shortfall::Voltage)));
     }
+
+    #[test]
+    fn the_derivative_gain_has_to_suffice_for_the_weaker_of_brake_and_motor() {
+        // The brake has 0.15 · 0.14 = 0.021 N m/V while it slides.
+        for (motor_gain, weaker) in [(0.01, 0.01), (0.05, 0.021)] {
+            let actuator = crate::BothActuator { brake_gain: 0.14, motor_gain, preload: 0.0 };
+            let plant = PlantParams { actuator: actuator.into(), ..PlantParams::default() };
+            let output = OutputParams { lowest: -10.0, ..OutputParams::default() };
+            let bounds = Bounds::around(&plant, &Tolerances::default()).unwrap();
+            let needs = |acceleration: f64, kd: f64| {
+                let p = LawParams::SmcSign(SmcSignParams { kp: 9.5, kd, ..SmcSignParams::default() });
+                let law = Law::new(&p, &Beside::paper(&plant, &output)).unwrap();
+                let c = certify_alone(&law, &bounds, &Demand { acceleration, ..at_2_deg_s() }).unwrap();
+                (c.kd_required, c.shortfall)
+            };
+            // Beyond the 27.7 rad/s² of the weight the motor has to help, and J f/k is what its K_d needs.
+            let needed = 0.0017 * 70.0 / weaker;
+            let (told, shortfall) = needs(30.0, 1.01 * needed);
+            assert!(
+                (told - needed).abs() < 1e-9 && shortfall.is_none(),
+                "{told} for {needed}, {shortfall:?}"
+            );
+            assert_eq!(needs(30.0, 0.99 * needed).1, Some(Shortfall::Kd), "{motor_gain}");
+            // Below it the weight catches up by itself.
+            let (told, shortfall) = needs(20.0, 0.119 / 0.021 + 0.01);
+            assert!((told - 0.119 / 0.021).abs() < 1e-9 && shortfall.is_none(), "{told}, {shortfall:?}");
+        }
+    }
 }

@@ -308,3 +308,60 @@ fn cut_off<T: Real>(alpha: T) -> (T, T) {
     };
     (lambda, (lambda * (lambda + alpha)).limit(T::ZERO, T::splat(0.99)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A belief of which a test makes something else.
+    fn with(change: impl FnOnce(&mut Belief<f32>)) -> bool {
+        let mut belief = Belief::default();
+        belief.rest();
+        change(&mut belief);
+        belief.is_finite()
+    }
+
+    #[test]
+    fn a_belief_is_given_up_as_soon_as_one_of_its_numbers_is_none() {
+        assert!(with(|_| ()));
+        for bad in [f32::NAN, f32::INFINITY] {
+            let alone: [fn(&mut Belief<f32>, f32); 10] = [
+                |b, x| b.motion.position = x,
+                |b, x| b.motion.velocity = x,
+                |b, x| b.friction.mean = x,
+                |b, x| b.friction.ripple = x,
+                |b, x| b.friction.slope = x,
+                |b, x| b.tt = x,
+                |b, x| b.ww = x,
+                |b, x| b.friction.hh = x,
+                |b, x| b.friction.rr = x,
+                |b, x| b.friction.ss = x,
+            ];
+            for (number, set) in alone.iter().enumerate() {
+                assert!(!with(|b| set(b, bad)), "{bad} in number {number}");
+            }
+        }
+        // A position that is measured divides by its variance, to which that of the measurement is added.
+        assert!(!with(|b| b.tt = -1e-6));
+        assert!(with(|b| b.tt = 0.0), "that of an edge remains");
+    }
+
+    #[test]
+    fn a_belief_is_given_up_before_its_numbers_can_no_longer_be_added_and_not_because_they_are_large() {
+        let pairs: [fn(&mut Belief<f32>, f32); 8] = [
+            |b, x| (b.motion.position, b.motion.velocity) = (x, x),
+            |b, x| (b.motion.velocity, b.friction.mean) = (x, x),
+            |b, x| (b.friction.mean, b.friction.ripple) = (x, x),
+            |b, x| (b.friction.ripple, b.friction.slope) = (x, x),
+            |b, x| (b.tt, b.ww) = (x, x),
+            |b, x| (b.ww, b.friction.hh) = (x, x),
+            |b, x| (b.friction.hh, b.friction.rr) = (x, x),
+            |b, x| (b.friction.rr, b.friction.ss) = (x, x),
+        ];
+        for (number, set) in pairs.iter().enumerate() {
+            // A sum of two that is no number of 32 bits, and one that is, of which the product is none.
+            assert!(!with(|b| set(b, 3e38)), "pair {number}");
+            assert!(with(|b| set(b, 3e19)), "pair {number}");
+        }
+    }
+}

@@ -306,6 +306,25 @@ mod tests {
         libm::sqrt(squares.sum::<f64>() / half.len() as f64)
     }
 
+    #[test]
+    fn evidence_has_the_logarithm_of_a_ratio_to_a_tenth_up_to_five_and_better_where_it_is_near_one() {
+        for (ratio, share) in [(1.1, 1e-4), (1.5, 1e-3), (2.0, 4e-3), (3.0, 0.02), (5.0, 0.1)] {
+            let exact: f64 = libm::log(ratio);
+            // Of 3 times the ratio to 3, and the other way round.
+            let (over, under) = (ratio_log(3.0 * ratio, 3.0), ratio_log(3.0, 3.0 * ratio));
+            assert!((over / exact - 1.0).abs() < share, "{ratio}: {over} for {exact}");
+            assert!((under / -exact - 1.0).abs() < share, "1/{ratio}: {under} for {}", -exact);
+        }
+        assert_eq!(ratio_log(7.0, 7.0), 0.0);
+    }
+
+    #[test]
+    fn an_edge_speaks_for_the_filter_that_has_foreseen_it_in_less_of_its_own_doubt() {
+        let (one, other) = (Surprise { square: 6.0, variance: 2.0 }, Surprise { square: 1.0, variance: 4.0 });
+        // Three variances against a quarter of one.
+        assert_eq!((relative(&one, &other), relative(&other, &one)), (2.75, -2.75));
+    }
+
     fn a_right_map_drives<T: Real>() {
         let states = ride::<T>(Some(&points(0.0)), 3000);
         let from = states.iter().position(BesideMapState::map_drives).expect("never drives");

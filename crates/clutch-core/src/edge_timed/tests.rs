@@ -1,5 +1,5 @@
 use super::*;
-use crate::{CoulombParams, MotorActuator, PlantParams};
+use crate::{CoulombParams, FrictionMap, MotorActuator, PlantParams};
 use std::vec::Vec;
 
 const PERIOD: Micros = Micros(1000);
@@ -296,4 +296,161 @@ fn an_encoder_has_the_waves_that_it_sees_or_those_of_the_default() {
         let more = EdgeTimedParams { waves: 1.02 * params.waves, ..params };
         assert!(EdgeTimed::new(&more, &plant(), encoder, PERIOD).is_err(), "{counts}");
     }
+}
+
+/// Counts per period² of a torque on the paper's shaft, N m.
+fn pull(torque: f64) -> f64 {
+    torque / 0.0017 * 1e-6 * 20_000.0 / core::f64::consts::TAU
+}
+
+/// Friction around a count of a disc that has its mean at count 100, and a thirty-second of it more with each further count.
+fn rising(count: i64) -> Place<f64> {
+    FrictionMap::new(84, 4, &[2048, 2560, 3072, 3584, 4096, 4608, 5120, 5632, 6144])
+        .unwrap()
+        .at(FixedCounts::from_counts(count))
+}
+
+/// The same at a position, over its mean.
+fn rise(counts: f64) -> f64 {
+    1.0 + (counts - 100.0) / 32.0
+}
+
+/// Velocity after a period, and the way in it, of the paper's shaft that goes at a velocity, counts per period, and that a voltage
+/// brakes with a multiple of the friction of a fast one.
+fn braked(velocity: f64, volts: f64, friction: f64) -> (f64, f64) {
+    let rate = velocity * 1e3 * core::f64::consts::TAU / 20_000.0;
+    let stribeck = 0.15 + 0.05 * libm::exp(-rate / 0.001);
+    let change = pull(0.047088 - stribeck * friction * 0.14 * volts - 0.001 * rate);
+    (velocity + change, velocity + 0.5 * change)
+}
+
+fn near(value: f64, expected: f64) -> bool {
+    (value - expected).abs() < 1e-9 * expected.abs().max(1.0)
+}
+
+#[test]
+fn at_the_start_a_shaft_may_as_well_rest_as_go_with_its_path() {
+    let f = filter::<f64>();
+    let start = |rate: f64| f.start(FixedCounts::from_counts(7), 3.0, rate);
+    let belief = start(2.0_f64.to_radians()).belief;
+    // 2 °/s are a ninth of a count in a period.
+    assert!(near(belief.ww, 1.0 / 81.0) && belief.motion.velocity == 0.0, "{}", belief.ww);
+    assert!(near(start(-20.0_f64.to_radians()).belief.ww, 100.0 / 81.0), "as well backwards");
+    // Friction is the model's to a quarter; beside it a wave of 0.15 of it, 340 times in the 20 000 counts of a turn.
+    let (friction, wave) = (belief.friction, 340.0 / 20_000.0 * core::f64::consts::TAU);
+    assert_eq!((friction.mean, friction.ripple, friction.hh), (1.0, 0.0, 0.0625));
+    assert!(near(friction.rr, 0.0225) && near(friction.ss, 0.0225 * wave * wave));
+    // A target that is none says nothing.
+    for rate in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e9, -1e9] {
+        assert_eq!(start(rate).belief.ww, 0.0, "{rate} rad/s");
+    }
+}
+
+#[test]
+fn a_voltage_on_its_way_brakes_with_the_friction_of_the_place_at_which_it_arrives() {
+    let p = EdgeTimedParams { delay: 1, ..EdgeTimedParams::<f64>::default() };
+    let f = EdgeTimed::new(&p, &plant(), Encoder::PAPER, PERIOD).unwrap();
+    // Fast, and where friction falls with the velocity; and with a single count back, which is none of a brake's shaft.
+    for (velocity, volts) in [(1.0, 3.0), (0.003, 0.5)] {
+        for back in [0, 1] {
+            let mut state = f.start(FixedCounts::from_counts(100), volts, 0.0);
+            f.place(&mut state, FixedCounts::from_counts(100 - back));
+            state.belief.motion = belief::Motion { position: 0.25, velocity };
+            (state.belief.friction.ripple, state.belief.friction.slope) = (0.1, 0.01);
+            state.belief.friction.hr = -0.01;
+            let ahead = f.ahead_on(&state, Some(&rising(100 - back)));
+            let (after, way) = braked(velocity, volts, 1.1 * rise(100.25));
+            let (position, middle) = (0.25 + way, way + 0.5 * after);
+            assert!(near(ahead.velocity, after) && near(ahead.position, position), "{ahead:?}, {after}");
+            // In the middle of the period in which the next voltage acts.
+            let here = rise(100.25 + middle);
+            assert!(near(ahead.friction, (1.1 + 0.01 * middle) * here), "{ahead:?}");
+            assert!(near(ahead.variance, (0.0625 - 0.02 + 0.0225) * here * here), "{ahead:?}");
+        }
+    }
+}
+
+#[test]
+fn a_period_is_braked_with_the_friction_of_the_place_in_its_middle() {
+    let f = filter::<f64>();
+    // The count stays; the next one; one back, which is none; two back, which a brake's shaft cannot have gone either, but
+    // which the filter has to take as they are.
+    for (position, read, from) in [(0.1, 100, 100.0), (0.9, 101, 100.0), (0.1, 99, 100.0), (0.1, 98, 100.0)] {
+        let mut state = f.start(FixedCounts::from_counts(100), 3.0, 0.0);
+        // It knows all, so that no edge and no silence teaches it anything.
+        state.belief.motion = belief::Motion { position, velocity: 0.2 };
+        state.belief.tt = 0.0;
+        let friction = &mut state.belief.friction;
+        (friction.hh, friction.rr, friction.ss) = (0.0, 0.0, 0.0);
+        state.phase = Phase::Sliding;
+        f.update_on(&mut state, FixedCounts::from_counts(read), 3.0, (0.06, 0.0), Some(&rising(read)));
+        let (after, way) = braked(0.2, 3.0, rise(from + position + 0.1));
+        assert!(near(state.velocity(), after), "at {read}: {}, {after}", state.velocity());
+        let ends = state.counts as f64 + state.belief.motion.position;
+        assert!(near(ends, from + position + way), "at {read}: {ends}");
+    }
+}
+
+#[test]
+fn friction_of_a_start_without_an_edge_is_a_mean_over_that_of_its_place() {
+    let f = filter::<f64>();
+    let pace = f.per_period(2.0_f64.to_radians());
+    let stopped = |volts: f64, mean: f64, back: i64| {
+        let mut state = f.start(FixedCounts::from_counts(108), volts, 0.0);
+        f.place(&mut state, FixedCounts::from_counts(108 - back));
+        state.belief.motion.position = 0.25;
+        state.belief.friction.mean = mean;
+        (state.phase, state.silent) = (Phase::Starting, 26.0);
+        f.look_for_rest(&mut state, pace, Some(&rising(108 - back)));
+        assert!(state.rests() && state.unmoved == 1.0);
+        let friction = state.belief.friction;
+        assert!(friction.mean == mean && near(friction.rr, (0.15 * mean) * (0.15 * mean)), "{friction:?}");
+        friction.level()
+    };
+    for back in [0, 1] {
+        // 0.9 V carry the weight with 2.49 times the model's friction, which is 1.26 of the mean here; and an eighth more holds it.
+        let carried = 1.134 * 0.047088 / (0.15 * 0.14 * 0.9) / rise(108.25);
+        assert!(near(stopped(0.9, 1.2, back), carried), "{}, {carried}", stopped(0.9, 1.2, back));
+    }
+    assert_eq!(stopped(4.0, 1.2, 0), 1.2, "a high voltage says nothing new");
+    assert_eq!(stopped(0.0, 1.2, 0), 10.0, "nor does one that carries nothing tell more than ten times");
+}
+
+#[test]
+fn steps_hand_over_their_place_and_a_friction_that_is_weighed_with_the_one_believed() {
+    let f = filter::<f64>();
+    let mut state = f.start(FixedCounts::from_counts(100), 3.0, 0.0);
+    let friction = &mut state.belief.friction;
+    (friction.hr, friction.hs, friction.slope) = (0.001, 0.002, 0.003);
+    (state.silent, state.gains, state.release, state.phase) = (5.0, 1.0, 3.0, Phase::Sliding);
+    f.take_over(&mut state, 0.75, 2.0);
+    let (belief, friction) = (state.belief, state.belief.friction);
+    // Two standard deviations, a quarter of what was believed and a fifth of the steps': weights of 16 and 25 of 41.
+    assert!(near(friction.mean, (16.0 + 25.0 * 2.0) / 41.0), "{}", friction.mean);
+    assert!(near(friction.hh, 0.0625 * 16.0 / 41.0), "{}", friction.hh);
+    assert!(near(friction.rr, 0.0225 * friction.mean * friction.mean), "{}", friction.rr);
+    assert_eq!((friction.ripple, friction.slope, friction.hr, friction.hs), (0.0, 0.0, 0.0, 0.0));
+    assert_eq!((belief.motion.position, belief.motion.velocity, belief.tt), (0.75, 0.0, 0.02));
+    assert_eq!((state.silent, state.gains, state.release, state.rests), (0.0, 0.0, 0.0, 1.0));
+    assert!(state.rests() && state.at_edge == friction);
+}
+
+#[test]
+fn a_filter_that_gets_a_map_keeps_the_friction_here_and_makes_it_the_mean_of_the_disc() {
+    let f = filter::<f64>();
+    let mut state = f.start(FixedCounts::from_counts(92), 3.0, 0.0);
+    let friction = &mut state.belief.friction;
+    (friction.mean, friction.ripple, friction.slope) = (1.1, 0.1, 0.05);
+    (friction.hr, friction.hs) = (0.01, 0.02);
+    state.belief.th = 0.03;
+    let known = f.known_from(&state, &rising(92)).belief;
+    // 1.2 of the model's friction where the disc has 0.77 of its mean.
+    assert!(near(known.friction.mean, 1.2 / rise(92.5)), "{}", known.friction.mean);
+    assert!(near(known.friction.hh, 0.0625 + 0.0225), "what the ripple was in doubt by is the mean's now");
+    let left = 0.15 * 1.2 / rise(92.5);
+    let wave = 340.0 / 20_000.0 * core::f64::consts::TAU;
+    assert!(near(known.friction.rr, left * left) && near(known.friction.ss, left * left * wave * wave));
+    assert_eq!((known.friction.ripple, known.friction.slope), (0.0, 0.0));
+    assert_eq!((known.friction.hr, known.friction.hs, known.th), (0.0, 0.0, 0.0));
+    assert_eq!((known.motion, known.tt), (state.belief.motion, state.belief.tt));
 }

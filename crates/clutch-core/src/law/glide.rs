@@ -450,4 +450,54 @@ mod tests {
         let e = Glide::<f64>::new(&p, &Beside::paper(&model, &output)).unwrap_err();
         assert_eq!(e.field(), "floor");
     }
+
+    #[test]
+    fn the_busiest_glide_has_all_the_delay_that_a_filter_may_have_and_a_lag() {
+        let busiest = <Glide<f64> as Listed<f64>>::busiest();
+        let (model, output) = (PlantParams::default(), OutputParams::default());
+        let built = |filter| Glide::new(&GlideParams { filter, ..busiest }, &Beside::paper(&model, &output)).map(|_| ());
+        assert_eq!(built(busiest.filter), Ok(()));
+        let more = EdgeTimedParams { delay: busiest.filter.delay + 1, ..busiest.filter };
+        assert_eq!(built(more).map_err(|e| e.field()), Err("delay"));
+        // An exponential approach costs a product more than a step.
+        assert!(busiest.filter.lag > 0.0);
+    }
+
+    #[test]
+    fn a_law_that_was_asked_without_a_servo_starts_from_the_voltage_that_was_there() {
+        let filter = EdgeTimedParams { delay: 2, ..EdgeTimedParams::default() };
+        let law = glide(GlideParams { filter, ..GlideParams::default() }, &PlantParams::default());
+        let tick = at(2.0);
+        let mut state = law.start(&tick, 5.0);
+        // Nobody tells it what the converter gave.
+        law.update(&mut state, &tick);
+        let (filter, belief, place) = law.filters.driving(&state.filters);
+        assert_eq!(filter.ahead_on(belief, place).pad, 5.0, "as long as no other voltage has arrived");
+    }
+
+    #[test]
+    fn in_steps_the_terms_are_friction_as_believed_and_the_way_from_the_end_of_the_step_to_the_path() {
+        let count = core::f64::consts::TAU / 20_000.0;
+        // Half a thousandth of a count in a period, and the path a quarter of a count ahead of the edge.
+        for (delay, way) in [(0, 0.0), (2, 2.0 * 5e-4)] {
+            let filter = EdgeTimedParams { delay, ..EdgeTimedParams::default() };
+            let law = glide(GlideParams { micro: 0.016, filter, ..GlideParams::default() }, &PlantParams::default());
+            let tick = Tick { error: 0.25 * count, target_velocity: 5e-4 * count / 1e-3, ..Tick::default() };
+            let mut state = law.start(&tick, 5.0);
+            let terms = law.update(&mut state, &tick).terms;
+            // The shaft is somewhere in its count: in the middle, for all that is known.
+            let expected = [
+                0.0,
+                0.15,
+                0.15 * 0.15 * (0.25 * 0.25 + 0.15 * 0.15),
+                (0.25 - 0.5 + way) * count,
+                tick.target_velocity,
+                3.0,
+                0.0,
+            ];
+            for (name, (term, expected)) in Glide::<f64>::TERMS.iter().zip(terms.iter().zip(expected)) {
+                assert!((term - expected).abs() <= 1e-9 * expected.abs(), "{name}: {term} for {expected}");
+            }
+        }
+    }
 }

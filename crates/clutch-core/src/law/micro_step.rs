@@ -414,4 +414,60 @@ mod tests {
             assert!(sum.is_finite(), "{target}: {state:?}");
         }
     }
+
+    /// The step that follows a rest, on a path that goes at `pace` and is `error` counts ahead: periods of letting go and of
+    /// holding; none if none is taken.
+    fn first_step(steps: &MicroStep<f64>, scale: f64, pace: f64, error: f64) -> Option<(f64, f64)> {
+        let mut state = MicroStepState { scale, ..begun() };
+        steps.decide(&mut state, error, pace);
+        assert_eq!(state.go, state.periods);
+        (state.go > 0.0).then_some((state.go, state.hold))
+    }
+
+    #[test]
+    fn a_step_is_held_until_the_shaft_that_its_way_tells_of_has_stopped() {
+        // Let go it gains 0.1 a period, and is believed to lose 0.25 held.
+        let steps = MicroStep::new(1.0, (0.1, 0.25), 1.0, (2.0, 0.0));
+        let believed = 0.5 * 0.1 * (1.0 + 0.1 / 0.25);
+        for (stop, go, hold) in [(0.25, 4.0, 4.0), (0.12, 3.0, 3.0), (0.04237, 3.0, 8.0), (0.0237, 3.0, 13.0)]
+        {
+            // The way of a step of one period, with what stops it in truth.
+            let way = 0.5 * 0.1 * (1.0 + 0.1 / stop);
+            let step = first_step(&steps, way / believed, 0.08, 30.0);
+            // A place with less friction than believed has a whole period for each that let go; then comes the delay.
+            assert!(
+                (go * 0.1 / stop).max(go) <= hold && hold < (go * 0.1 / stop).max(go) + 1.0,
+                "{stop}: no test"
+            );
+            assert_eq!(step, Some((go, hold + 2.0)), "{stop}");
+        }
+        // One that is believed to stop slower than it sets off is held for as long whatever the way tells.
+        let slow = MicroStep::new(1.0, (0.1, 0.04), 1.0, (0.0, 0.0));
+        assert_eq!(first_step(&slow, 0.5, 0.01, 30.0), Some((1.0, 3.0)));
+    }
+
+    #[test]
+    fn a_step_is_the_shortest_whose_succession_is_a_quarter_faster_than_the_path() {
+        for (delay, scale) in [(0.0, 1.0), (0.0, 2.1), (1.0, 1.0), (3.0, 1.4)] {
+            let steps = MicroStep::new(1.0, (0.09, 0.17), 0.0, (delay, 0.0));
+            let k = 0.5 * 0.09 * (1.0 + 0.09 / 0.17) * scale;
+            let ratio = f64::max(2.0 * k / 0.09 - 1.0, 1.0);
+            for pace in [0.003, 0.013, 0.04, 0.09, 0.3, -0.013, -0.3] {
+                let fast = |m: f64| m * m * k / (m * (1.0 + ratio) + delay) >= 1.25 * f64::abs(pace);
+                let shortest = (1..).map(f64::from).find(|m| fast(*m)).unwrap();
+                // It is taken as soon as the path is half a step ahead.
+                let half = 0.5 * shortest * shortest * k;
+                let taken =
+                    |error: f64| first_step(&steps, scale, pace, error * pace.signum()).map(|(go, _)| go);
+                assert_eq!(
+                    (taken(1.001 * half), taken(0.999 * half)),
+                    (Some(shortest), None),
+                    "{delay}, {pace}"
+                );
+                assert_eq!(taken(-1.001 * half), None, "back on a path that goes on");
+            }
+        }
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (0.0, 0.0));
+        assert_eq!(first_step(&steps, 1.0, 10.0, 1e6).map(|(go, _)| go), Some(64.0), "whatever the path");
+    }
 }
