@@ -7,8 +7,8 @@ use crate::desk::{
 use clutch_core::law::{LawParams, Limit, SmcParams};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, Cause, State};
-use clutch_core::{FixedCounts, LimitParams, Micros, SafeState, SupervisorParams};
-use clutch_node::{BoardController, Ending, Notice, Outbox, Outboxes};
+use clutch_core::{FixedCounts, LimitParams, Micros, SafeState, Servo, SupervisorParams};
+use clutch_node::{BoardController, Ending, HostNode, Notice, Outbox, Outboxes};
 use clutch_settings::{MAX_KNOTS, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Discover, Message, Ping,
@@ -608,6 +608,25 @@ fn a_ping_is_answered_with_the_boards_clock() {
 }
 
 #[test]
+fn a_host_that_shows_that_it_lives_pings_with_numbers_that_nobody_asks_the_clock_with() {
+    let mut desk = Desk::running(Plan::new());
+    let mut numbers = Vec::new();
+    for _ in 0..3 {
+        desk.now_ns = desk.host.poll_at().unwrap();
+        let mut out = Outbox::default();
+        desk.host.poll(desk.now_ns, &mut out, &mut |n| panic!("{n:?}"));
+        let [Message::Ping(ping)] = frames(out.as_bytes())[..] else {
+            panic!("{:?}", frames(out.as_bytes()))
+        };
+        assert_eq!(ping.run, 5);
+        numbers.push(ping.nonce);
+    }
+    // Whoever asks counts from below: the answer to a sign of life is none to that.
+    assert!(numbers[0] >= 0x8000_0000, "{numbers:x?}");
+    assert_eq!((numbers[1], numbers[2]), (numbers[0] + 1, numbers[0] + 2));
+}
+
+#[test]
 fn how_it_ended_and_what_the_line_has_carried_is_told_whichever_end_it_was() {
     for encoder_fault in [false, true] {
         let mut desk = Desk::running(Plan::new());
@@ -640,7 +659,7 @@ fn what_the_line_has_carried_is_told_each_second() {
 // Frames that get lost on the way to the host.
 
 /// A host's view of frames: how often it was told of a sample, and where it thinks control stands.
-fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, clutch_node::HostNode) {
+fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, HostNode) {
     let (mut host, mut notices) = (desk.plan.host(), Vec::new());
     host.receive(0, bytes, &desk.plan.path(), &mut |n| notices.push(n));
     (notices, host)
@@ -831,5 +850,27 @@ fn a_board_whose_periods_are_not_those_of_the_hosts_clock_is_given_up() {
         });
         assert_eq!(seen.is_some(), most.is_some(), "{more} ns: {seen:?}, {:?}", desk.host.standing());
         assert!(seen <= most, "{more} ns: {seen:?}");
+    }
+}
+
+/// A simulated board may wait: whoever gives it more than two seconds before its silence counts, gives its clock four times as
+/// long.
+#[test]
+fn a_board_that_may_be_silent_for_long_may_be_slow_for_as_long() {
+    let plan = Plan::new();
+    // Periods of 12 ms in place of 1 ms: a second of them is 11 s late.
+    for (silent_ms, from, to) in [(2000, 1, 10), (2001, 720, 760), (2400, 870, 910), (5500, 1500, 1500)] {
+        let mut desk = Desk::new(plan);
+        let servo = Servo::new(&plan.servo).unwrap();
+        desk.host = HostNode::new(servo, configure(&plan), ALIVE_NS, silent_ms * MS);
+        desk.asks(|host, out| host.discover(7, out));
+        desk.configures();
+        desk.arms();
+        let seen = (0..1500).find(|_| {
+            desk.follows(1);
+            desk.host_later_ns += 11 * MS;
+            desk.host.standing().cause == Cause::Clock
+        });
+        assert!((from..=to).contains(&seen.unwrap_or(1500)), "{silent_ms} ms: {seen:?}");
     }
 }
