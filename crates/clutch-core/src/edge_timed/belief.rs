@@ -364,4 +364,231 @@ mod tests {
             assert!(with(|b| set(b, 3e19)), "pair {number}");
         }
     }
+
+    type Matrix = [[f64; 5]; 5];
+
+    const SHAFT: Shaft<f64> =
+        Shaft { damping: 0.03, stiffness: 0.04, decay: 0.02, walk: 1e-4, gain_doubt: 0.3, roughness: 0.005 };
+
+    /// Some covariance of position, velocity, mean, ripple and slope.
+    const SOME: Matrix = [
+        [0.080, 0.010, 0.003, -0.004, 0.0010],
+        [0.010, 0.020, 0.002, 0.001, -0.0020],
+        [0.003, 0.002, 0.060, -0.005, 0.0004],
+        [-0.004, 0.001, -0.005, 0.030, 0.0007],
+        [0.001, -0.002, 0.0004, 0.0007, 0.0050],
+    ];
+
+    /// A belief in a motion, of which the friction is 1.2 and 0.1 more, with the slope 0.05.
+    fn some(velocity: f64) -> Belief<f64> {
+        let [t, w, h, r, s] = SOME;
+        let friction = Friction {
+            mean: 1.2,
+            ripple: 0.1,
+            slope: 0.05,
+            hh: h[2],
+            hr: h[3],
+            hs: h[4],
+            rr: r[3],
+            rs: r[4],
+            ss: s[4],
+        };
+        let motion = Motion { position: 0.3, velocity };
+        let ([tt, tw, th, tr, ts], [_, ww, wh, wr, ws]) = (t, w);
+        Belief { motion, friction, tt, tw, th, tr, ts, ww, wh, wr, ws }
+    }
+
+    fn covariance(b: &Belief<f64>) -> Matrix {
+        let f = &b.friction;
+        [
+            [b.tt, b.tw, b.th, b.tr, b.ts],
+            [b.tw, b.ww, b.wh, b.wr, b.ws],
+            [b.th, b.wh, f.hh, f.hr, f.hs],
+            [b.tr, b.wr, f.hr, f.rr, f.rs],
+            [b.ts, b.ws, f.hs, f.rs, f.ss],
+        ]
+    }
+
+    fn means(b: &Belief<f64>) -> [f64; 5] {
+        [b.motion.position, b.motion.velocity, b.friction.mean, b.friction.ripple, b.friction.slope]
+    }
+
+    fn product(a: &Matrix, b: &Matrix) -> Matrix {
+        core::array::from_fn(|i| core::array::from_fn(|j| (0..5).map(|k| a[i][k] * b[k][j]).sum()))
+    }
+
+    fn turned(a: &Matrix) -> Matrix {
+        core::array::from_fn(|i| core::array::from_fn(|j| a[j][i]))
+    }
+
+    /// The covariance of what a matrix makes of numbers with another one.
+    fn through(f: &Matrix, p: &Matrix) -> Matrix {
+        product(&product(f, p), &turned(f))
+    }
+
+    #[track_caller]
+    fn same(a: &Matrix, b: &Matrix) {
+        for (x, y) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((x - y).abs() < 1e-12, "{a:?}\n{b:?}");
+        }
+    }
+
+    #[test]
+    fn a_period_spreads_the_belief_as_the_equations_of_the_page_and_the_disc_turns_under_it() {
+        for (way, velocity, pull) in [(1.0, 0.5, 0.09), (-1.0, -0.5, -0.09)] {
+            let (load, fall) = (0.1, 0.04);
+            let mut belief = some(velocity);
+            let gone = belief.advance(&SHAFT, pull, (load, fall), true);
+            // a = D − w (h + r) sgn ω − c ω
+            let a = pull - way * load * 1.3 - 0.03 * velocity;
+            let delta = velocity + 0.5 * a;
+            let (b, keep) = (-way * load, 1.0 - 0.03 + 0.04 * 1.3);
+            let moves = [
+                [1.0, 1.0, 0.5 * b, 0.5 * b, 0.0],
+                [0.0, keep, b, b, 0.0],
+                [0.0, 0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 1.0, 0.0],
+                [0.0, 0.0, 0.0, 0.0, 1.0],
+            ];
+            let mut expected = through(&moves, &SOME);
+            expected[1][1] += 1e-4 + (0.3 * a) * (0.3 * a);
+            // s' = s − Δ (k² r + 2 ζ k s), the damping for the way either way; r' = r + Δ s'
+            let (down, left) = (-delta * 0.04, 1.0 - delta.abs() * 0.02);
+            let turns = [
+                [1.0, 0.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 1.0 + delta * down, delta * left],
+                [0.0, 0.0, 0.0, down, left],
+            ];
+            expected = through(&turns, &expected);
+            // A ripple that is a share of friction gets rough with its square.
+            expected[4][4] += 0.005 * delta.abs() * 1.2 * 1.2;
+            same(&covariance(&belief), &expected);
+            let slope = down * 0.1 + left * 0.05;
+            for (mean, expected) in
+                means(&belief).iter().zip([0.3 + delta, velocity + a, 1.2, 0.1 + delta * slope, slope])
+            {
+                assert!((mean - expected).abs() < 1e-12, "{:?}", means(&belief));
+            }
+            assert!((gone - delta).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_measured_position_is_weighed_by_its_variance_and_what_goes_with_it_is_learnt() {
+        let mut belief = some(0.5);
+        let surprise = belief.correct(0.4, 0.02);
+        assert!((surprise.square - 0.01).abs() < 1e-12 && (surprise.variance - 0.1).abs() < 1e-12);
+        let column = SOME[0];
+        let before = [0.3, 0.5, 1.2, 0.1, 0.05];
+        for ((mean, before), c) in means(&belief).iter().zip(before).zip(column) {
+            assert!((mean - (before + c * 0.1 / 0.1)).abs() < 1e-12, "{:?}", means(&belief));
+        }
+        let expected =
+            core::array::from_fn(|i| core::array::from_fn(|j| SOME[i][j] - column[i] * column[j] / 0.1));
+        same(&covariance(&belief), &expected);
+    }
+
+    #[test]
+    fn a_shaft_comes_to_rest_after_the_square_of_its_velocity_over_twice_its_slowing() {
+        for way in [1.0, -1.0] {
+            let mut motion = Motion { position: 0.3, velocity: 0.2 * way };
+            let (gone, a, lacks) = motion.glide(&SHAFT, 0.05 * way, 0.4, 1.5);
+            let slowing = 0.4 * 1.5 - 0.05 + 0.03 * 0.2;
+            assert!((a + slowing * way).abs() < 1e-12 && (lacks - (slowing - 0.2)).abs() < 1e-12);
+            let stops = 0.2 * 0.2 / (2.0 * slowing) * way;
+            assert!((gone - stops).abs() < 1e-12 && (motion.position - 0.3 - stops).abs() < 1e-12, "{gone}");
+            assert_eq!(motion.velocity, 0.0);
+            // One that goes on.
+            let mut motion = Motion { position: 0.3, velocity: 0.2 * way };
+            let (gone, .., lacks) = motion.glide(&SHAFT, 0.05 * way, 0.1, 1.5);
+            let after = 0.2 - (0.1 * 1.5 - 0.05 + 0.03 * 0.2);
+            assert!((motion.velocity - after * way).abs() < 1e-12 && lacks == 0.0);
+            assert!(
+                (gone - 0.5 * (0.2 + after) * way).abs() < 1e-12
+                    && (motion.position - 0.3 - gone).abs() < 1e-12
+            );
+        }
+        // From rest it goes the way in which it is pulled.
+        let mut motion = Motion { position: 0.3, velocity: 0.0 };
+        motion.glide(&SHAFT, -0.5, 0.1, 1.5);
+        assert!((motion.velocity + 0.35).abs() < 1e-12, "{}", motion.velocity);
+    }
+
+    #[test]
+    fn a_shaft_whose_velocity_is_known_may_stop_though_it_is_known_to_move() {
+        let mut belief = some(0.1);
+        (belief.tw, belief.ww, belief.wh, belief.wr, belief.ws) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        belief.friction.hh = 0.0;
+        (belief.friction.hr, belief.friction.rr) = (0.0, 0.0);
+        let shaft = Shaft { walk: 0.0, gain_doubt: 0.0, ..SHAFT };
+        belief.advance(&shaft, 0.05, (0.4, 0.0), true);
+        assert!(belief.is_finite() && belief.motion.velocity == 0.0, "{belief:?}");
+    }
+
+    #[test]
+    fn no_measurement_makes_friction_vanish_or_its_ripple_more_than_six_tenths_of_it() {
+        for (measured, mean, ripple) in [(1e3, 10.0, -6.0), (-1e3, 0.1, 0.06)] {
+            let mut belief = some(0.5);
+            belief.correct(measured, 0.02);
+            assert_eq!((belief.friction.mean, belief.friction.ripple), (mean, ripple), "{measured}");
+        }
+    }
+
+    #[test]
+    fn a_normal_distribution_that_is_cut_off_has_the_mean_and_the_variance_of_the_tables() {
+        // φ/Φ and its product with φ/Φ + α.
+        for (alpha, lambda, share) in [
+            (-3.0, 3.283_099, 0.929_44),
+            (-1.0, 1.525_135, 0.800_90),
+            (0.0, 0.797_885, core::f64::consts::FRAC_2_PI),
+            (1.0, 0.287_600, 0.370_31),
+            (2.0, 0.055_248, 0.113_55),
+        ] {
+            let (has, goes) = cut_off::<f64>(alpha);
+            assert!((has / lambda - 1.0).abs() < 0.012, "{alpha}: {has}");
+            assert!((goes / share - 1.0).abs() < 0.05, "{alpha}: {goes}");
+        }
+        assert_eq!(cut_off::<f64>(-1e3).1, 0.99, "some variance stays, however far it is off");
+    }
+
+    #[test]
+    fn silence_leaves_what_is_far_from_the_edge_and_moves_what_is_near_away_from_it() {
+        let known = |position: f64, side: f64| {
+            let mut belief = some(0.5);
+            belief.motion.position = position;
+            (belief.tt, belief.tr, belief.ts) = (0.03, 0.0, 0.0);
+            belief.keep_within(if side > 0.0 { 1.0 } else { 0.0 }, side, 0.01);
+            belief
+        };
+        // Deviation and blur together 0.2: the edge is 3.4 and 3.6 of them away.
+        for (side, near, far) in [(1.0, 0.32, 0.28), (-1.0, 0.68, 0.72)] {
+            assert_eq!(known(far, side).motion.position, far);
+            let belief = known(near, side);
+            let moved = (near - belief.motion.position) * side;
+            assert!(moved > 0.0 && moved < 1e-3, "{side}: {moved}");
+            // At the edge: by 0.798 deviations, as far as the variance is the position's; and 0.637 of it goes.
+            let belief = known(if side > 0.0 { 1.0 } else { 0.0 }, side);
+            let (end, share) = (belief.motion.position, 1.0 - belief.tt / 0.03);
+            let inside = if side > 0.0 { 1.0 - end } else { end };
+            assert!((inside / (0.797_885 * 0.2 * 0.75) - 1.0).abs() < 0.012, "{side}: {inside}");
+            assert!((share / (core::f64::consts::FRAC_2_PI * 0.75) - 1.0).abs() < 0.03, "{side}: {share}");
+            // Beyond it: 1.525 deviations.
+            let belief = known(if side > 0.0 { 1.2 } else { -0.2 }, side);
+            let back = if side > 0.0 { 1.2 - belief.motion.position } else { belief.motion.position + 0.2 };
+            assert!((back / (1.525_135 * 0.2 * 0.75) - 1.0).abs() < 0.012, "{side}: {back}");
+        }
+    }
+
+    #[test]
+    fn a_shaft_at_rest_is_anywhere_in_its_count() {
+        let mut belief = some(0.5);
+        belief.rest();
+        // A uniform distribution; friction is as it was, and nothing goes with the place any more.
+        assert_eq!((belief.motion, belief.tt), (Motion { position: 0.5, velocity: 0.0 }, 1.0 / 12.0));
+        assert_eq!(belief.friction, some(0.5).friction);
+        let p = covariance(&belief);
+        assert!(p[0][1..] == [0.0; 4] && p[1] == [0.0; 5], "{p:?}");
+    }
 }

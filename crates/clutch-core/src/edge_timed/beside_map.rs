@@ -251,6 +251,7 @@ fn ratio_log<T: Real>(a: T, b: T) -> T {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Phase;
     use super::*;
     use crate::{FrictionMap, PlantParams};
     use std::vec::Vec;
@@ -397,5 +398,37 @@ mod tests {
         assert!(state.plain.rests() && state.mapped.rests());
         f.let_go(&mut state, 0.035);
         assert!(state.plain.lets_go() && state.mapped.lets_go());
+    }
+
+    #[test]
+    fn steps_hand_over_the_friction_of_their_place_and_a_filter_with_a_map_makes_it_the_mean_of_the_disc() {
+        let (f, points) = (filters::<f64>(), points(0.0));
+        let mut state = ride::<f64>(Some(&points), 1500)[1499];
+        state.place = FrictionMap::new(0, 4, &points).unwrap().at(FixedCounts::from_counts(44));
+        // So much in doubt that nothing but the word of the steps counts.
+        (state.plain.belief.friction.hh, state.mapped.belief.friction.hh) = (1e12, 1e12);
+        f.take_over(&mut state, 0.25, 1.3);
+        let (plain, mapped) = (state.plain.belief.friction.mean, state.mapped.belief.friction.mean);
+        assert!((plain - 1.3).abs() < 1e-9, "{plain}");
+        assert!((mapped / (1.3 / disc(44.25)) - 1.0).abs() < 2e-3 && disc(44.25) < 0.86, "{mapped}");
+        assert!(state.plain.rests() && state.mapped.rests());
+    }
+
+    #[test]
+    fn an_edge_that_only_one_of_the_filters_has_foreseen_says_nothing() {
+        let (f, points) = (filters::<f64>(), points(0.0));
+        let mut before = ride::<f64>(Some(&points), 1500)[1499];
+        before.evidence = 4.0;
+        let read = FixedCounts::from_counts(before.plain.counts + 1);
+        let place = FrictionMap::new(0, 4, &points).unwrap().at(read);
+        let says = |plain: Phase, mapped: Phase| {
+            let mut state = before;
+            (state.plain.phase, state.mapped.phase) = (plain, mapped);
+            f.update(&mut state, (read, &place), 2.2, (0.035, 0.0));
+            (state.evidence != before.evidence, state.part())
+        };
+        assert_eq!(says(Phase::Sliding, Phase::Sliding), (true, DRIVES));
+        assert_eq!(says(Phase::Resting, Phase::Sliding), (false, DRIVES));
+        assert_eq!(says(Phase::Sliding, Phase::Resting), (false, DRIVES));
     }
 }

@@ -454,3 +454,127 @@ fn a_filter_that_gets_a_map_keeps_the_friction_here_and_makes_it_the_mean_of_the
     assert_eq!((known.friction.hr, known.friction.hs, known.th), (0.0, 0.0, 0.0));
     assert_eq!((known.motion, known.tt), (state.belief.motion, state.belief.tt));
 }
+
+#[test]
+fn a_brake_that_lags_is_let_go_for_seven_tenths_of_its_lag_longer() {
+    let p = EdgeTimedParams { lag: 0.01, ..EdgeTimedParams::default() };
+    let f = EdgeTimed::<f64>::new(&p, &plant(), Encoder::PAPER, PERIOD).unwrap();
+    let mut state = f.start(FixedCounts(0), 5.0, 0.0);
+    f.let_go(&mut state, 20.0_f64.to_radians());
+    // 12.6 periods of the drive, and 7.
+    assert_eq!(state.release, 20.0);
+}
+
+#[test]
+fn a_sensor_finer_than_a_count_is_read_in_parts_of_one() {
+    let f = filter::<f64>();
+    let fraction = |bits: i64| f.start(FixedCounts(bits), 5.0, 0.0).fraction();
+    let count = 1 << FixedCounts::FRACTION_BITS;
+    assert_eq!(
+        (fraction(7 * count), fraction(7 * count + count / 4), fraction(count / 8 - count)),
+        (0.0, 0.25, 0.125)
+    );
+}
+
+#[test]
+fn a_shaft_that_gains_speed_loses_the_friction_by_which_the_curve_falls() {
+    let f = filter::<f64>();
+    // Over the next hundredth of a count in a period, which is 3.14 thousandths of the paper's 0.001 rad/s.
+    let rate = 1e3 * core::f64::consts::TAU / 20_000.0;
+    let level = |velocity: f64| (0.15 + 0.05 * libm::exp(-velocity.abs() * rate / 0.001)) / 0.15;
+    for velocity in [0.001, 0.01, -0.01, 0.03] {
+        let (shape, fall) = f.shape_and_fall(velocity);
+        assert!((shape / level(velocity) - 1.0).abs() < 1e-6, "{shape}");
+        let expected = 100.0 * (level(velocity) - level(velocity.abs() + 0.01));
+        assert!((fall - expected).abs() < 1e-5 * expected, "{fall} for {expected} at {velocity}");
+    }
+    assert_eq!(f.shape_and_fall(0.0), (0.2 / 0.15, 0.0), "one that has stopped");
+    assert_eq!(f.shape_and_fall(1.0).1, 0.0, "one whose curve has ended");
+}
+
+#[test]
+fn a_period_of_a_lagging_brake_has_the_mean_of_the_voltages_at_its_ends() {
+    for (lag, ends) in [(0.003, [1.0, 4.0 - 3.0 * libm::exp(-1.0 / 3.0)]), (0.0, [4.0, 4.0])] {
+        let p = EdgeTimedParams { lag, ..EdgeTimedParams::default() };
+        let f = EdgeTimed::<f64>::new(&p, &plant(), Encoder::PAPER, PERIOD).unwrap();
+        let mut state = f.start(FixedCounts(0), 1.0, 0.0);
+        let (_, volts) = f.hear(&mut state, FixedCounts(0), 4.0);
+        assert!(near(volts, 0.5 * (ends[0] + ends[1])) && near(state.pad, ends[1]), "{volts}, {}", state.pad);
+    }
+}
+
+/// The filter of a shaft that a motor drives either way.
+fn of_motor() -> EdgeTimed<f64> {
+    let motor = MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+    let motor = PlantParams { actuator: motor.into(), drive_torque: 0.0, ..PlantParams::default() };
+    EdgeTimed::new(&EdgeTimedParams::default(), &Plant::new(&motor).unwrap(), Encoder::PAPER, PERIOD).unwrap()
+}
+
+#[test]
+fn silence_says_that_the_edge_ahead_is_not_reached_whichever_way_a_shaft_goes() {
+    let f = of_motor();
+    // Volts that balance friction, so that the velocity stays.
+    for (velocity, volts, side) in [(0.1, 0.75, 1.0), (-0.1, -0.75, -1.0)] {
+        let mut state = f.start(FixedCounts(0), volts, 0.0);
+        state.phase = Phase::Sliding;
+        state.belief.motion = belief::Motion { position: 0.5 + 0.4 * side, velocity };
+        f.update(&mut state, FixedCounts(0), volts, velocity);
+        // Without it it would be at the edge.
+        let away = 0.5 - (state.belief.motion.position - 0.5) * side;
+        assert!(away > 0.1 && away < 0.5, "{velocity}: {away} counts from the edge ahead");
+    }
+    // A brake's shaft that is let go and has not begun to move: the edge ahead is the upper one.
+    let f = filter::<f64>();
+    let mut state = f.start(FixedCounts(0), 9.0, 0.0);
+    state.phase = Phase::Starting;
+    state.belief.motion.position = 0.9;
+    f.update(&mut state, FixedCounts(0), 9.0, 0.03);
+    assert!(
+        state.belief.motion.velocity == 0.0 && state.belief.motion.position < 0.85,
+        "{:?}",
+        state.belief.motion
+    );
+}
+
+#[test]
+fn an_edge_is_behind_a_shaft_by_half_the_way_of_a_period_whichever_way_it_goes() {
+    let f = of_motor();
+    for (velocity, expected) in [(0.5, 0.25), (-0.5, 0.75), (7.0, 0.5), (1e-4, 0.01)] {
+        let mut state = f.start(FixedCounts(0), 0.0, 0.0);
+        state.phase = Phase::Sliding;
+        // Nothing is known of the place but the edge.
+        state.belief.tt = 1e9;
+        f.crossed(&mut state, f64::signum(velocity), velocity);
+        let position = state.belief.motion.position;
+        assert!((position - expected).abs() < 1e-6, "{velocity}: {position}");
+    }
+}
+
+#[test]
+fn four_edges_make_up_for_a_rest() {
+    let f = filter::<f64>();
+    let mut state = f.start(FixedCounts(0), 2.2, 0.03);
+    state.rests = 1.0;
+    let rested: Vec<bool> = (1..=5)
+        .map(|n| {
+            f.update(&mut state, FixedCounts::from_counts(n), 2.2, 0.03);
+            state.has_rested()
+        })
+        .collect();
+    assert_eq!(rested, [true, true, true, false, false]);
+}
+
+#[test]
+fn each_rest_makes_the_friction_at_the_last_edge_more_doubtful_than_the_one_before() {
+    let f = filter::<f64>();
+    let mut state = f.start(FixedCounts(0), 2.2, 0.03);
+    state.at_edge.mean = 1.2;
+    for rests in 1..=3 {
+        (state.phase, state.silent) = (Phase::Sliding, 31.0);
+        // A tenth of a count in a period: three of them in thirty.
+        f.look_for_rest(&mut state, 0.1, None);
+        let more = 0.12 * f64::from(rests);
+        assert!(state.rests() && near(state.belief.friction.hh, 0.0625 + more * more), "{rests}");
+        assert_eq!((state.belief.friction.mean, state.rests), (1.2, f64::from(rests)));
+    }
+}
