@@ -432,3 +432,162 @@ fn volts_older_than_those_kept_may_be_any_of_the_output_or_what_was_there() {
     assert_eq!(in_force(15, 3072, true), [0.0, 10.0]);
     assert_eq!(in_force(1000, 1024, true), [-5.0, 10.0]);
 }
+
+/// The tolerances of these bounds: damping half as much again, inertia a fifth less.
+#[test]
+fn drag_slows_the_lightest_shaft_with_the_most_damping_and_only_the_one_that_comes_back() {
+    let envelope = envelope::<f64>(0, &bare());
+    let at = |speeds| envelope.rates([2.0, 3.0], speeds);
+    let [up, down] = at([0.0; 2]);
+    let [fast, slow] = at([3.0, 5.0]);
+    // C/J over a period of 1 ms, of the velocity of the other side, whose way back this is.
+    let drag = 1.5 * 0.001 / (0.8 * 0.0017) * PERIOD;
+    for (has, rest, speed) in [(&fast, &up, 5.0), (&slow, &down, 3.0)] {
+        assert_eq!(has.onward, rest.onward);
+        assert!((has.back - rest.back - drag * speed).abs() < 1e-12, "{} {}", has.back, rest.back);
+    }
+    let [fast, slow] = at([-3.0, -5.0]);
+    assert_eq!((fast.back, slow.back), (up.back, down.back), "one that goes the other way drives no drag");
+}
+
+#[test]
+fn of_the_first_sample_a_count_is_known_and_no_velocity_below_the_fastest() {
+    let bounds = Bounds::around(&model(1), &tolerances()).unwrap();
+    for (speed, fastest) in [(10.0, 1000.0), (700.0, 1400.0)] {
+        let limits = LimitParams { edge_counts: 0.25, ..bare() };
+        let servo = ServoParams::<f64>::paper(LawParams::Pd(PdParams::default()));
+        let dac = Dac::new(&servo.dac).unwrap();
+        let envelope = Envelope::new(&limits, dac, &servo.output, &bounds, 1.0, PERIOD, speed);
+        let s = envelope.start(DacCode(2048));
+        for [up, down] in s.sides {
+            // Somewhere in the count, whose edges may be off: from −1/4 to 5/4, and as seen from the other way.
+            assert_eq!((up.position, down.position), (1.25, 0.25));
+            for (side, from) in [(up, -0.25), (down, -1.25)] {
+                assert_eq!((side.old.from, side.young.from, side.old.age), (from, from, 0.0));
+                assert_eq!(side.velocity, fastest);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_brake_goes_one_way_only_where_some_drive_is_certain() {
+    let one_way = |kind, low| {
+        let bounds = Bounds::around(&model(kind), &tolerances()).unwrap();
+        let drive_torque = crate::Interval { low, high: 0.1 };
+        limits_of(&Bounds { drive_torque, ..bounds }, &bare()).envelope.one_way
+    };
+    assert_eq!([1e-3, 0.0, -1e-3].map(|low| one_way(0, low)), [true, false, false]);
+    assert_eq!([1e-3, 0.0].map(|low| one_way(1, low)), [false; 2], "a motor turns a shaft back");
+    assert_eq!([1e-3, 0.0].map(|low| one_way(2, low)), [true, false]);
+}
+
+#[test]
+fn a_shaft_whose_edges_are_off_by_as_much_as_allowed_stays_inside() {
+    // At 100 °/s a brake balances the weight; edges wander by three counts, a wave of them in a few periods to many.
+    let bounds = Bounds::around(&PlantParams::<f64>::default(), &Tolerances::default()).unwrap();
+    let limits = LimitParams { edge_counts: 3.0, ..bare() };
+    let envelope = limits_of::<f64>(&bounds, &limits).envelope;
+    let pace = 100.0 / 360.0 * 20_000.0 * PERIOD;
+    for wave in [3.0, 5.0, 8.0, 13.0, 21.0, 34.0, 55.0] {
+        let volts = (0.047088 - 0.001 * 100.0_f64.to_radians()) / (0.15 * 0.14);
+        let (mut s, mut seen) = (envelope.start(code(&envelope, volts)), 0);
+        for k in 1..2000 {
+            let time = f64::from(k);
+            let off = 2.99 * libm::sin(core::f64::consts::TAU * time / wave);
+            let counts = libm::floor(pace * time + off) as i32;
+            s.sends(code(&envelope, volts));
+            assert_eq!(envelope.judge(&mut s, false, counts - seen, 1), None, "{wave}: after {k} ms");
+            seen = counts;
+        }
+    }
+}
+
+/// A side that has such a velocity, with windows of an age of four periods and of one.
+fn side(velocity: f64) -> Side<f64> {
+    let old = Window { from: -0.5, age: 4.0, moment: 0.5 };
+    let young = Window { from: 0.25, age: 1.0, moment: 0.0 };
+    Side { position: 1.5, velocity, way: 0.0, old, young }
+}
+
+#[test]
+fn the_fastest_shaft_goes_by_the_laws_of_free_fall_and_stops_or_turns_where_it_has_to() {
+    for (velocity, onward, back, after, way) in [
+        // On and on; until it stands; from rest; and held at rest.
+        (2.0, 0.125, 9.0, 2.5, 9.0),
+        (0.25, -0.125, 9.0, 0.0, 0.5),
+        (0.0, 0.125, 9.0, 0.5, 1.0),
+        (0.0, -0.125, -0.25, -1.0, -2.0),
+        // It comes back; to rest; and beyond, as if it had turned at once.
+        (-2.0, 0.125, 0.25, -1.0, -6.0),
+        (-1.0, 0.125, 0.25, 0.0, -2.0),
+        (-0.5, 0.125, 0.5, 0.5, 2.0),
+        (-0.5, 0.125, 0.25, 0.5, 2.0),
+        (-0.5, -0.125, 0.25, 0.0, 0.0),
+    ] {
+        let next = side(velocity).after(&Rates { onward, back }, 0.25, 4.0);
+        assert_eq!(
+            (next.velocity, next.way, next.position),
+            (after, way, 1.5),
+            "{velocity}, {onward}, {back}"
+        );
+        // ∫ (t − t₀) a dt of 1/4 from 4 to 8 and from 1 to 5 periods, beside what there was.
+        assert_eq!((next.old.age, next.old.moment, next.old.from), (8.0, 0.5 + 0.125 * (64.0 - 16.0), -0.5));
+        assert_eq!((next.young.age, next.young.moment, next.young.from), (5.0, 0.125 * (25.0 - 1.0), 0.25));
+    }
+}
+
+#[test]
+fn counts_take_the_way_of_the_shaft_and_the_begin_of_its_windows_back() {
+    let mut s = Side { way: 0.75, ..side(1.0) };
+    s.arrive(2.0);
+    assert_eq!((s.position, s.old.from, s.young.from), (0.25, -2.5, -1.75));
+}
+
+#[test]
+fn a_window_has_the_mean_velocity_of_its_way_and_what_a_later_acceleration_may_have_added() {
+    // 1.5 + 0.5 counts in four periods, and half a count.
+    for (velocity, seen) in [(1.0, 0.625), (0.5, 0.5)] {
+        let mut s = side(velocity);
+        s.look_back(-0.75, true);
+        assert_eq!(s.velocity, seen);
+        assert_eq!((s.old, s.young), (side(0.0).old, side(0.0).young), "both windows are young enough");
+    }
+    // A shaft that does not turn is no slower than at rest.
+    for (turns, seen) in [(true, -0.375), (false, 0.0)] {
+        let mut s = Side { position: -2.5, ..side(1.0) };
+        s.look_back(-0.75, turns);
+        assert_eq!(s.velocity, seen);
+    }
+    // A younger one takes its place when it is blurred by 0.4 of a count, or sixteen periods old.
+    for (age, moment, replaced) in
+        [(15.0, 0.39, false), (16.0, 0.0, true), (17.0, 0.0, true), (2.0, 0.41, true)]
+    {
+        let young = Window { from: 0.25, age, moment };
+        let mut s = Side { young, ..side(1.0) };
+        s.look_back(-0.75, true);
+        let begins = Window { from: -0.75, age: 0.0, moment: 0.0 };
+        let expected = if replaced { (young, begins) } else { (side(0.0).old, young) };
+        assert_eq!((s.old, s.young), expected, "{age}, {moment}");
+    }
+}
+
+#[test]
+fn a_window_begins_where_the_shaft_is_at_least_on_either_side() {
+    let envelope = envelope::<f64>(1, &LimitParams { edge_counts: 0.25, ..bare() });
+    // It balances friction and drag at that pace: 0.05 u + 0.01 = 0.15 (0.1 + 0.015 u) + 0.0005 N m.
+    let (mut s, mut begun) = (envelope.start(code(&envelope, 0.115)), 0);
+    for k in 0..200_i32 {
+        // Three counts in two periods.
+        assert_eq!(envelope.judge(&mut s, false, 1 + k % 2, 1), None);
+        let [up, down] = s.sides[usize::from(s.swapped)];
+        // The shaft is between −down and up, the axis turned round between −up and down.
+        for (side, least) in [(up, -down.position), (down, -up.position)] {
+            if side.young.age == 0.0 {
+                assert_eq!(side.young.from, least, "{k}");
+                begun += 1;
+            }
+        }
+    }
+    assert!(begun > 20, "{begun} windows");
+}
