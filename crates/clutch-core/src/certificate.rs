@@ -703,4 +703,50 @@ mod tests {
             assert!((told - 0.119 / 0.021).abs() < 1e-9 && shortfall.is_none(), "{told}, {shortfall:?}");
         }
     }
+
+    #[test]
+    fn an_accelerated_path_and_a_rate_of_reaching_are_paid_for_on_both_sides() {
+        let demand = Demand { acceleration: 5.0, reach_rate: 2.0, ..at_2_deg_s() };
+        let near = |what: &str, value: f64, expected: f64| {
+            assert!((value - expected).abs() < 1e-9 * expected.abs(), "{what}: {value} for {expected}");
+        };
+        let smc = LawParams::SmcSign(SmcSignParams { kp: 9.0, kd: 50.0, ..SmcSignParams::default() });
+        let drag = 0.001 * 2.0_f64.to_radians();
+
+        // A brake: 0.021 N m/V against the weight of 0.047088 N m, which alone catches up.
+        let drive = Tolerances { drive_torque: 0.25, ..Tolerances::default() };
+        let c = certify_alone(&law(smc), &bounds(drive), &demand).unwrap();
+        let (heavy, light) = (1.25 * 0.047088, 0.75 * 0.047088);
+        assert!(c.certified(), "{c:?}");
+        near("volts", c.kp_required, (heavy + 0.0017 * 7.0) / 0.021);
+        // However much it brakes, what is behind is not bought by it.
+        near("reaching", c.reach_rate_possible, (9.0 * 0.021 - heavy) / 0.0017 - 5.0);
+        near("ahead", c.error_rate_ahead, ((10.0 * 0.021 - heavy) / 0.0017 - 7.0) / 70.0);
+        near("behind", c.error_rate_behind, ((light - drag) / 0.0017 - 7.0) / 70.0);
+        near("drive", c.least_torque, light);
+
+        // A motor against a load and its own friction, behind: it has to push, and with no more than the output gives.
+        let actuator = crate::MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+        let motor = PlantParams { actuator: actuator.into(), drive_torque: -0.01, ..PlantParams::default() };
+        let with = |highest: f64| {
+            let output = OutputParams { lowest: -10.0, highest, on_invalid: 0.0, ..OutputParams::default() };
+            let law = Law::new(&smc, &Beside::paper(&motor, &output)).unwrap();
+            certify_alone(&law, &Bounds::around(&motor, &Tolerances::default()).unwrap(), &demand).unwrap()
+        };
+        let c = with(10.0);
+        let load = 0.01 + 0.2 * 0.25 + drag;
+        assert!(c.certified(), "{c:?}");
+        near("volts", c.kp_required, (load + 0.0017 * 7.0) / 0.05);
+        near("reaching", c.reach_rate_possible, (9.0 * 0.05 - load) / 0.0017 - 5.0);
+        near("behind", c.error_rate_behind, ((10.0 * 0.05 - load) / 0.0017 - 7.0) / 70.0);
+        assert_eq!([1.4, 1.5].map(|highest| with(highest).shortfall), [Some(Shortfall::Voltage), None]);
+    }
+
+    #[test]
+    fn a_law_without_a_surface_has_no_rate_off_it_that_it_follows() {
+        let p = LawParams::Pd(PdParams { kd: 0.0, ..PdParams::default() });
+        let c = certify_alone(&law(p), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        assert_eq!((c.shortfall, c.slope), (Some(Shortfall::Surface), 0.0));
+        assert_eq!((c.error_rate_ahead, c.error_rate_behind), (0.0, 0.0));
+    }
 }

@@ -470,4 +470,78 @@ mod tests {
         let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (0.0, 0.0));
         assert_eq!(first_step(&steps, 1.0, 10.0, 1e6).map(|(go, _)| go), Some(64.0), "whatever the path");
     }
+
+    #[test]
+    fn a_path_below_the_rate_is_followed_in_steps_either_way_and_one_that_rests_if_it_was_before() {
+        let steps = MicroStep::new(0.0625, (0.09, 0.17), 1.0, (0.0, 0.0));
+        let ended = MicroStepState::default();
+        for (pace, taken) in [(0.06, true), (-0.06, true), (0.0625, false), (0.07, false), (-0.07, false)] {
+            assert_eq!((steps.takes(&begun(), pace), steps.takes(&ended, pace)), (taken, taken), "{pace}");
+        }
+        assert!(steps.takes(&begun(), 0.0) && !steps.takes(&ended, 0.0));
+    }
+
+    #[test]
+    fn steps_begin_after_the_voltages_on_their_way_and_remember_what_was_learnt() {
+        let mut state = MicroStepState { scale: 0.0, push: 0.0, ..MicroStepState::default() };
+        state.begin(0.25, 2.0);
+        assert_eq!((state.hold, state.scale, state.push, state.least), (3.0, 1.0, PUSHED, 1.0));
+        state = MicroStepState { scale: 1.5, push: 2.0, least: 3.0, since_edge: 9.0, ..state };
+        state.begin(7.0, 0.0);
+        assert_eq!((state.hold, state.scale, state.push, state.least), (1.0, 1.5, 2.0, 3.0));
+        assert_eq!((state.position, state.since_edge), (1.0, 0.0), "in its count");
+    }
+
+    #[test]
+    fn steps_without_an_edge_for_two_counts_are_pushed_by_a_seventh_more_or_let_go_for_a_period_more() {
+        // A step of one period makes a count: 1/2 (1 + 1).
+        let with = |only: f64, lag: f64| MicroStep::new(1.0, (1.0, 1.0), only, (0.0, lag));
+        let after = |steps: &MicroStep<f64>, since_edge: f64, push: f64, least: f64| {
+            let mut state = MicroStepState { since_edge, push, least, from_edge: 1.0, ..begun() };
+            steps.insist(&mut state);
+            assert_eq!(state.from_edge == 0.0, since_edge > 2.0);
+            (state.push, state.least, state.since_edge)
+        };
+        let (motor, brake) = (with(0.0, 0.0), with(1.0, 0.0));
+        assert_eq!(after(&motor, 2.0, 2.0, 1.0), (2.0, 1.0, 2.0), "two counts are not more than two");
+        let (push, least, since) = after(&motor, 3.0, 2.0, 1.0);
+        assert!((push - 2.3).abs() < 1e-12 && least == 1.0 && since == 0.0, "{push}");
+        assert_eq!(after(&motor, 3.0, 4.9, 1.0), (5.0, 1.0, 0.0), "at most");
+        // A fall of a count and a half takes 1.73 periods; one more, and two lags.
+        assert_eq!(after(&brake, 3.0, 2.0, 1.0), (2.0, 2.0, 0.0));
+        assert_eq!(after(&brake, 3.0, 2.0, 2.0), (2.0, 2.0, 0.0));
+        assert_eq!(after(&with(1.0, 1.5), 3.0, 2.0, 5.0), (2.0, 5.0, 0.0));
+        assert!((with(1.0, 1.5).longest - 5.732_05).abs() < 1e-5);
+    }
+
+    #[test]
+    fn only_steps_from_edge_to_edge_and_their_own_way_teach_it() {
+        let steps = MicroStep::new(1.0, (0.5, 0.5), 0.0, (0.0, 0.0));
+        // Two steps of two periods with half a count of a period: four counts were to come.
+        let learns = |from_edge: f64, before: f64, periods: f64, counts: f64, sign: f64| {
+            let mut state =
+                MicroStepState { from_edge, since_edge: before, periods, counts, sign, ..begun() };
+            steps.judge(&mut state);
+            assert_eq!((state.counts, state.since_edge, state.from_edge), (0.0, 0.0, 1.0));
+            (state.scale, state.position)
+        };
+        // Three tenths of what they came short by; the place is half the way of a step from the edge, half a count at most.
+        assert_eq!(learns(1.0, 4.0, 2.0, 2.0, 1.0), (0.85, 0.5));
+        assert_eq!(learns(1.0, 4.0, 2.0, -2.0, -1.0), (0.85, 0.5));
+        assert_eq!(learns(1.0, 3.0, 1.0, -1.0, -1.0), (0.85, 0.75));
+        assert_eq!(learns(1.0, 3.0, 1.0, 1.0, 1.0), (0.85, 0.25));
+        for (from_edge, before, periods, counts, sign) in [
+            // From the middle of a count; without a step; and back.
+            (0.0, 4.0, 2.0, 2.0, 1.0),
+            (1.0, 0.0, 0.0, 2.0, 1.0),
+            (1.0, 4.0, 2.0, 2.0, -1.0),
+            (1.0, 4.0, 2.0, -2.0, 1.0),
+        ] {
+            assert_eq!(
+                learns(from_edge, before, periods, counts, sign).0,
+                1.0,
+                "{from_edge}, {before}, {counts}, {sign}"
+            );
+        }
+    }
 }
