@@ -596,12 +596,12 @@ mod tests {
         }
     }
 
-    /// True if the error grows over 2²⁰ periods, by squaring the matrix that carries it.
+    /// True if the error grows over 2⁴⁰ periods, by squaring the matrix that carries it.
     fn grows(k: &ObserverGains<f64>, m: &Model<f64>) -> bool {
         let phi = Matrix3::new(1.0, m.phi12, m.phi13, 0.0, 1.0 - m.loss, m.phi23, 0.0, 0.0, 1.0);
         let k = Vector3::new(k.position, k.velocity, k.disturbance);
         let mut a = phi - k * phi.row(0);
-        for _ in 0..20 {
+        for _ in 0..40 {
             a = a * a;
             if a.amax() > 1e100 || a.amax() < 1e-100 {
                 break;
