@@ -591,3 +591,23 @@ fn a_window_begins_where_the_shaft_is_at_least_on_either_side() {
     }
     assert!(begun > 20, "{begun} windows");
 }
+
+#[test]
+fn where_the_fastest_is_slower_than_the_slowest_the_window_that_took_more_of_a_velocity_names_the_suspect() {
+    let envelope = envelope::<f64>(1, &LimitParams { edge_counts: 0.25, ..bare() });
+    // A velocity before, and the one of a window of four periods that ends at the position.
+    let side = |position: f64, velocity: f64, seen: f64| {
+        let old = Window { from: position - 4.0 * seen, age: 4.0, moment: 0.0 };
+        Side { position, velocity, way: 0.0, old, young: Window { age: 2.0, ..Window::default() } }
+    };
+    let judged = |up: [f64; 2], down: [f64; 2]| {
+        let mut s = envelope.start(code(&envelope, 0.0));
+        envelope.expect(&mut s, false);
+        s.sides[1] = [side(1.0, up[0], up[1]), side(0.25, down[0], down[1])];
+        envelope.judge(&mut s, false, 0, 1)
+    };
+    // The counts take 5/4 of the one and 1 of the other: behind the slowest, or ahead of the fastest.
+    assert_eq!(judged([1.0, -0.25], [1.125, 0.125]), Some((Cause::TooSlow, 0.125)));
+    assert_eq!(judged([1.125, 0.125], [1.0, -0.25]), Some((Cause::TooFast, 0.125)));
+    assert_eq!(judged([1.125, 0.25], [1.0, -0.25]), None, "one shaft can have both velocities");
+}
