@@ -425,6 +425,14 @@ mod tests {
     }
 
     #[test]
+    fn a_brake_never_drives_a_motor_does_both_ways_and_both_on_one_signal_backwards() {
+        let drives = |kind: ActuatorKind| [-1.0, 0.0, 1.0].map(|volts: f64| kind.drives_at(volts));
+        assert_eq!(drives(ActuatorKind::Brake), [false, false, false]);
+        assert_eq!(drives(ActuatorKind::Motor), [true, false, true]);
+        assert_eq!(drives(ActuatorKind::Both), [true, false, false]);
+    }
+
+    #[test]
     fn actuators_of_different_kinds_are_not_one() {
         let (one, other) = (motor(0.4), both());
         assert_eq!(Actuator::in_lanes::<f64>(&|get| get(&one)), Some(one));

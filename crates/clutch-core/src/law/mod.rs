@@ -481,6 +481,8 @@ mod tests {
     #[test]
     fn laws_say_what_they_have() {
         assert_eq!(those_with(|p| p.sampled().is_some()), ["pd", "smc", "pid"]);
+        // A derivative with a filter of its own has a state that the certificate has not.
+        assert_eq!(those_with(|p| !p.sampled_if().is_empty()), ["pid"]);
         assert_eq!(those_with(|p| p.filter().is_some()), ["glide"]);
         let damped = ["pd", "ctc", "smc", "pid", "smc_integral", "dob", "glide"];
         assert_eq!(

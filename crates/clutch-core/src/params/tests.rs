@@ -192,6 +192,9 @@ fn each_kind_of_value_has_its_words() {
     let along = Unit { text: "°, 1", ..S_DEG };
     let turn = words(Kind::Points, Range::within(0.0, 360.0), &along, false);
     assert_eq!(turn, format!("{angles} from 0 to 360 °"));
+    // 2⁶³ − 1 of a file is no number of 53 bits.
+    let largest = words(Kind::Whole, Range::within(1.0, 9_223_372_036_854_775_808.0), &NONE, false);
+    assert!(largest.ends_with(" to 9223372036854775807"), "{largest}");
     // The ends in the key's unit, or in the struct's.
     let range = Range::above(0.0).below(90.0);
     assert_eq!(words(Kind::Real, range, &DEG, false), "a number above 0 and below 90 °");
@@ -247,6 +250,9 @@ fn a_unit_goes_to_si_and_back_and_is_found_by_the_end_of_a_key() {
         }
     }
     assert_eq!((PERCENT.to_si(40.0), DEG.to_si(180.0), MS.to_si(3.0)), (0.4, core::f64::consts::PI, 3.0));
+    // As people are shown it.
+    assert_eq!((MS.factor(), MRAD_S.factor(), V.factor(), PERCENT.factor()), (1e3, 1e3, 1.0, 100.0));
+    assert!((DEG.factor() - 180.0 / core::f64::consts::PI).abs() < 1e-12);
     // The longest one, and no part of a word.
     assert_eq!(Unit::of_key("kp_v_rad").map(|u| u.text), Some("V/rad"));
     assert_eq!((Unit::of_key("revs"), Unit::of_key("gain")), (None, None));
