@@ -123,6 +123,7 @@ UNITS = {
     "rad_s3": "rad/s³",
     "rad": "rad",
     "ms": "ms",
+    "mrad_s": "mrad/s",
     "mv": "mV",
     "mnm": "mN m",
     "mm": "mm",
@@ -1808,7 +1809,8 @@ class Glide(_Params):
         edge. A number from 0 to 10.
     micro_below_deg_s : float, default 0.0
         Rate of the path below which the shaft goes in micro-steps, between which it rests; 0 takes none. A
-        finite number of at least 0 °/s.
+        finite number of at least 0 °/s; 0 with a filter.lag_s above 0.0005 s, under which micro-steps are no
+        longer small.
     filter : EdgeTimed
         Filter of velocity and friction. By default `EdgeTimed()`.
 
