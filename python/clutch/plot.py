@@ -1293,10 +1293,12 @@ def identified(found: Identified) -> Figure:
         _falls(axes["falls"], found.falls)
     _rides(axes["rides"], found.rides)
     told = [row for row in identified_rows() if row[0] in found.parameters]
+    farthest = 1.0
     for row, (key, *_) in enumerate(reversed(told)):
         e = found.parameters[key]
         scale = 100 / e.value if e.value else 0.0
         ends = [(e.low - e.value) * scale, (e.high - e.value) * scale]
+        farthest = max(farthest, *map(abs, ends))
         left.plot(ends, [row, row], lw=3, color=_BLUE, solid_capstyle="butt")
         left.plot([0], [row], "k|", ms=8)
     shown = ((label, found.parameters[key].value * factor, unit) for key, label, unit, factor in reversed(told))
@@ -1307,8 +1309,7 @@ def identified(found: Identified) -> Figure:
     ticks = [-100, -10, -1, 0, 1, 10, 100]
     left.set_xticks(ticks, [f"{tick}".replace("-", "−") for tick in ticks])
     left.set_xticks([], minor=True)
-    far = 1.3 * max([1.0, *(abs(end) for line in left.lines for end in line.get_xdata())])
-    left.set_xlim(-far, far)
+    left.set_xlim(-1.3 * farthest, 1.3 * farthest)
     left.axvline(0, lw=0.6, color="0.8", zorder=0)
     left.set_xlabel("interval around the value, %")
     if found.map:
