@@ -57,16 +57,14 @@ impl ScenarioArgs {
         Ok(scenario)
     }
 
-    /// Refuses a scenario whose certificate reckons with another delay or lag than the rig file has.
-    pub(crate) fn expect_times_found(&self, scenario: &Scenario) -> anyhow::Result<()> {
-        let Some(rig) = self.identified.as_deref().map(read_rig_file).transpose()? else { return Ok(()) };
-        rig.other_times(scenario).first().map_or(Ok(()), |other| Err(other.refusal(scenario.name()).into()))
-    }
-
-    /// Remarks a delay or lag that the scenario's rig or its filter has otherwise than the rig file.
-    pub(crate) fn remark_other_times(&self, scenario: &Scenario) -> anyhow::Result<()> {
+    /// Remarks a delay or lag that the scenario's rig or its filter has otherwise than the rig file; `proves`: refuses that of the
+    /// rig, by which a certificate reckons.
+    pub(crate) fn hold_times(&self, scenario: &Scenario, proves: bool) -> anyhow::Result<()> {
         let Some(rig) = self.identified.as_deref().map(read_rig_file).transpose()? else { return Ok(()) };
         let (of_rig, believed) = (rig.other_times(scenario), rig.otherwise_believed(scenario));
+        if let (true, Some(other)) = (proves, of_rig.first()) {
+            return Err(other.refusal(scenario.name()).into());
+        }
         for (others, effect) in [(of_rig, "rig and certificate are"), (believed, "the filter believes it")] {
             for other in others {
                 let why = format!("note: {} = {}: expected {}", other.key, other.value, other.expected);

@@ -54,10 +54,7 @@ impl Certify {
         check_files(&save)?;
         let scenario = self.scenario.load()?;
         // Nothing that is proven in continuous time asks for a delay.
-        if !matches!(asked, Asked::Nothing) {
-            self.scenario.expect_times_found(&scenario)?;
-        }
-        self.scenario.remark_other_times(&scenario)?;
+        self.scenario.hold_times(&scenario, !matches!(asked, Asked::Nothing))?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let rig =

@@ -40,10 +40,7 @@ impl CompiledArgs {
     pub(crate) fn load(&self) -> anyhow::Result<Option<Compiled>> {
         let file = self.scenario.scenario.display();
         let scenario = self.scenario.load()?;
-        if !self.uncertified {
-            self.scenario.expect_times_found(&scenario)?;
-        }
-        self.scenario.remark_other_times(&scenario)?;
+        self.scenario.hold_times(&scenario, !self.uncertified)?;
         let cleared = match check(&scenario, self.certificate.as_deref(), self.uncertified, None) {
             Ok(cleared) => cleared,
             Err(ClearanceError::NotCertified { lack, .. }) => {

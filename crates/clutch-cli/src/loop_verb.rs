@@ -162,10 +162,7 @@ impl Loop {
         let args = ScenarioArgs { scenario, set, identified, map };
         let scenario = args.load()?;
         args.remark_unused_map(&scenario);
-        if !self.uncertified {
-            args.expect_times_found(&scenario)?;
-        }
-        args.remark_other_times(&scenario)?;
+        args.hold_times(&scenario, !self.uncertified)?;
         if let Some(log) = &self.log
             && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
         {

@@ -112,7 +112,7 @@ impl Sim {
         }
         let scenario = self.scenario.load()?;
         self.scenario.remark_unused_map(&scenario);
-        self.scenario.remark_other_times(&scenario)?;
+        self.scenario.hold_times(&scenario, false)?;
         let run = with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
