@@ -3,10 +3,11 @@
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::{ARROW_SCHEMA_META_KEY, ArrowSchemaConverter, encode_arrow_schema};
 use parquet::basic::{Compression, ZstdLevel};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType as Kind, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedColumnWriter;
 use parquet::file::writer::SerializedFileWriter;
 use std::collections::HashMap;
 use std::fs::File;
@@ -17,15 +18,17 @@ use std::sync::Arc;
 /// Rows that are written at once: of a log a minute at 1 kHz, in memory some ten megabytes.
 pub(crate) const TOGETHER: usize = 1 << 16;
 
-/// Values of a column.
+/// Values of a column. `Known…` has null where there is none; its field is nullable.
 pub(crate) enum Column<'a> {
     Whole(&'a [i64]),
     Real(&'a [f64]),
     Flag(&'a [bool]),
     Text(Vec<&'a str>),
+    KnownReal(&'a [Option<f64>]),
+    KnownFlag(&'a [Option<bool>]),
 }
 
-/// A column as a reader sees it; a unit or a meaning that is empty is none.
+/// A column as a reader sees it, without nulls; a unit or a meaning that is empty is none.
 pub(crate) fn field(name: &str, of: DataType, (unit, meaning): (&str, &str)) -> Field {
     let known = [("units", unit), ("long_name", meaning)];
     let known = known.into_iter().filter(|(_, text)| !text.is_empty());
@@ -73,6 +76,8 @@ impl Columnar {
                     let all: Vec<ByteArray> = all.into_iter().map(ByteArray::from).collect();
                     to.typed::<ByteArrayType>().write_batch(&all, None, None)
                 }
+                Column::KnownReal(all) => known::<DoubleType>(&mut to, all),
+                Column::KnownFlag(all) => known::<BoolType>(&mut to, all),
             }?;
             to.close()?;
         }
@@ -83,4 +88,11 @@ impl Columnar {
     pub(crate) fn end(self) -> io::Result<()> {
         self.0.close().map(drop).map_err(io::Error::other)
     }
+}
+
+/// Writes a column with nulls.
+fn known<T: Kind>(to: &mut SerializedColumnWriter<'_>, all: &[Option<T::T>]) -> Result<usize, ParquetError> {
+    let levels: Vec<i16> = all.iter().map(|value| i16::from(value.is_some())).collect();
+    let values: Vec<T::T> = all.iter().flatten().cloned().collect();
+    to.typed::<T>().write_batch(&values, Some(&levels), None)
 }

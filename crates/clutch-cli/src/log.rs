@@ -1,7 +1,7 @@
 //! `clutch log`.
 
 use crate::export::Export;
-use crate::output::{Exit, new_file, paragraph, print, to_write};
+use crate::output::{Exit, folded, new_file, paragraph, print, to_write};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ impl Log {
         let text = match self.verb {
             Verb::Info { log } => {
                 let info = clutch_log::info(&log, &Limits::default())?;
-                print(&format!("{info}\n"))?;
+                print(&folded(&info.to_string()))?;
                 return Ok(if info.complete { Exit::Done } else { Exit::Incomplete });
             }
             Verb::Recover { from, to } => {

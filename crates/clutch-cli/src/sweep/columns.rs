@@ -9,13 +9,20 @@ use clutch_sim::Scenario;
 use clutch_sim::metrics::{Detected, Metrics, figure_columns};
 use clutch_sim::scenario::{CERTIFIED, Value};
 use std::path::Path;
+use std::str::FromStr;
 
-/// Values of a column, as they are read.
+/// Values of a column, as they are read. What a run may leave unknown, and a refused row always does, is null.
 enum Cells {
     Whole(Vec<i64>),
     Real(Vec<f64>),
-    Flag(Vec<bool>),
+    Figure(Vec<Option<f64>>),
+    Flag(Vec<Option<bool>>),
     Text(Vec<String>),
+}
+
+/// A cell of the CSV: none if it is empty; an error if it is no such value.
+fn known<T: FromStr>(cell: &str) -> Result<Option<T>, T::Err> {
+    if cell.is_empty() { Ok(None) } else { cell.parse().map(Some) }
 }
 
 impl Cells {
@@ -31,21 +38,13 @@ impl Cells {
         }
     }
 
-    /// Takes a cell of the CSV; false if it is none of this column. Of a row that was refused a figure is NaN, and it is not
-    /// certified, as in Python.
+    /// Takes a cell of the CSV; false if it is none of this column.
     fn push(&mut self, cell: &str) -> bool {
         match self {
             Cells::Whole(all) => cell.parse().map(|x| all.push(x)).is_ok(),
-            Cells::Real(all) if cell.is_empty() => {
-                all.push(f64::NAN);
-                true
-            }
             Cells::Real(all) => cell.parse().map(|x| all.push(x)).is_ok(),
-            Cells::Flag(all) if cell.is_empty() => {
-                all.push(false);
-                true
-            }
-            Cells::Flag(all) => cell.parse().map(|x| all.push(x)).is_ok(),
+            Cells::Figure(all) => known(cell).map(|x| all.push(x)).is_ok(),
+            Cells::Flag(all) => known(cell).map(|x| all.push(x)).is_ok(),
             Cells::Text(all) => {
                 all.push(cell.to_owned());
                 true
@@ -57,7 +56,8 @@ impl Cells {
         match self {
             Cells::Whole(all) => Column::Whole(all),
             Cells::Real(all) => Column::Real(all),
-            Cells::Flag(all) => Column::Flag(all),
+            Cells::Figure(all) => Column::KnownReal(all),
+            Cells::Flag(all) => Column::KnownFlag(all),
             Cells::Text(all) => Column::Text(all.iter().map(String::as_str).collect()),
         }
     }
@@ -66,6 +66,7 @@ impl Cells {
         match self {
             Cells::Whole(all) => all.clear(),
             Cells::Real(all) => all.clear(),
+            Cells::Figure(all) => all.clear(),
             Cells::Flag(all) => all.clear(),
             Cells::Text(all) => all.clear(),
         }
@@ -74,11 +75,11 @@ impl Cells {
     fn field(&self, name: &str, about: (&str, &str)) -> Field {
         let of = match self {
             Cells::Whole(_) => DataType::Int64,
-            Cells::Real(_) => DataType::Float64,
+            Cells::Real(_) | Cells::Figure(_) => DataType::Float64,
             Cells::Flag(_) => DataType::Boolean,
             Cells::Text(_) => DataType::Utf8,
         };
-        field(name, of, about)
+        field(name, of, about).with_nullable(matches!(self, Cells::Figure(_) | Cells::Flag(_)))
     }
 }
 
@@ -96,7 +97,7 @@ impl Grid {
         for (name, _) in figure_columns(&Metrics::default(), &Detected::default()) {
             let about =
                 about.iter().find(|(figure, _)| *figure == name).map_or(("", ""), |(_, about)| *about);
-            add(name, Cells::Real(Vec::new()), about);
+            add(name, Cells::Figure(Vec::new()), about);
         }
         add(CERTIFIED, Cells::Flag(Vec::new()), ("", ""));
         add("error", Cells::Text(Vec::new()), ("", ""));
