@@ -66,6 +66,7 @@ crate::params! {
 }
 
 /// The reason that gains are not certified.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shortfall {

@@ -56,6 +56,7 @@ impl<T: Real> Envelope<T> {
 }
 
 /// The reason that a path cannot be followed.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Obstacle {
     /// The path runs backwards, which nothing drives: velocity, rad/s.
@@ -71,6 +72,7 @@ pub enum Obstacle {
 }
 
 /// The point at which a path cannot be followed, and the reason.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Infeasible<T> {
     /// The first tick at which it cannot.

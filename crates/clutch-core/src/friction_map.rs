@@ -26,6 +26,7 @@ pub struct FrictionMap<'a> {
 }
 
 /// Points are none of a map.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoMap {
     /// There are so many, of at least four.

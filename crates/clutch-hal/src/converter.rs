@@ -18,6 +18,7 @@ pub struct Pwm<P> {
 }
 
 /// A timer whose steps are coarser than the converter's codes.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CoarsePwm {
     /// Its steps in a period.

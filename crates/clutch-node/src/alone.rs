@@ -70,6 +70,7 @@ pub struct AloneRun<L: Listed<f32>, P> {
 }
 
 /// A run that a board cannot take.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AloneMisfit {
     /// The board's own parameters.

@@ -109,6 +109,7 @@ impl BoardParams {
 }
 
 /// The reason why a board cannot be as its parameters say.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardMisfit {
     /// [`BoardParams::dac_bits`] is outside 1…16.

@@ -5,6 +5,7 @@ use clutch_core::{Arithmetic, Micros};
 use clutch_wire::{Configured, ControllerHello, Fault, FrameError, Hello, Refused, Sample, Stopped, Taken};
 
 /// Counts of what the line has carried.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounts {
     /// Samples of this run.
@@ -71,6 +72,7 @@ pub enum Notice<T: Arithmetic, Terms> {
 }
 
 /// An end of control that no sample brought.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ending<T> {
     /// The supervisor's state before it.
@@ -86,6 +88,7 @@ pub struct Ending<T> {
 }
 
 /// The state of control: of a controller at once, of a board controller as it reported last.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Standing<T> {
     /// The supervisor's state.

@@ -29,6 +29,7 @@ macro_rules! codes {
     })+) => {
         $(
             $(#[doc = $doc])+
+            #[cfg_attr(feature = "defmt", derive(defmt::Format))]
             #[derive(Clone, Copy, Debug, PartialEq, Eq)]
             #[repr(u8)]
             pub enum $name {

@@ -75,6 +75,7 @@ fn close(code: &mut u8, rest: &mut [u8], length: usize) -> usize {
 }
 
 /// The reason why bytes were dropped.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// The stuffing is wrong: a code points past the end of the frame.

@@ -250,10 +250,9 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
             let built = core(&["--target", target, "--features", features])?;
             tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
         }
-        let built = part("clutch-node", &["--target", target, "--features", "defmt"])?;
-        tally.check_quiet(&format!("clutch-node builds for {target} with defmt"), built);
-        let built = part("clutch-hal", &["--target", target])?;
-        tally.check_quiet(&format!("clutch-hal builds for {target}"), built);
+        // With what clutch-wire, clutch-settings and clutch-node have for it.
+        let built = part("clutch-hal", &["--target", target, "--features", "defmt"])?;
+        tally.check_quiet(&format!("clutch-hal builds for {target} with defmt"), built);
     }
     no_panic(tally)?;
     libraries(tally)?;
