@@ -28,6 +28,8 @@ crate::params! {
 pub struct SmoothedDerivative<T> {
     keep: T,
     scale: T,
+    /// For a difference in 2⁻¹⁶ counts.
+    fine_scale: T,
 }
 
 /// Memory of (5).
@@ -57,19 +59,29 @@ impl<T: Real> SmoothedDerivative<T> {
     ) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
         let period = period.period::<T>()?;
+        let scale = p.smoothing * encoder.radians_per_count() / period;
+        // By a power of two: a product with it has the same bits.
         Ok(SmoothedDerivative {
             keep: T::ONE - p.smoothing,
-            scale: p.smoothing * encoder.radians_per_count() / period,
+            scale,
+            fine_scale: FixedCounts(1).minus::<T>(FixedCounts(0)) * scale,
         })
     }
 
     /// One sample: the error `e_k` in, `ė_k` out, rad/s.
     #[inline]
     pub fn update(&self, state: &mut DerivativeState<T>, error: FixedCounts) -> T {
-        let difference: T = error.minus(state.previous);
+        let difference = error.0.wrapping_sub(state.previous.0);
         state.previous = error;
-        state.rate = self.smooth(state.rate, difference);
+        state.rate = self.smooth_fine(state.rate, T::from_i64(difference));
         state.rate
+    }
+
+    /// As [`SmoothedDerivative::smooth`], with the difference in 2⁻¹⁶ counts.
+    #[inline]
+    #[must_use]
+    pub fn smooth_fine(&self, rate: T, difference: T) -> T {
+        self.keep * rate + self.fine_scale * difference
     }
 }
 
@@ -77,7 +89,11 @@ impl<T: Arithmetic> SmoothedDerivative<T> {
     /// The filters of several lanes as one.
     #[must_use]
     pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SmoothedDerivative<L> {
-        SmoothedDerivative { keep: each(&|f| f.keep), scale: each(&|f| f.scale) }
+        SmoothedDerivative {
+            keep: each(&|f| f.keep),
+            scale: each(&|f| f.scale),
+            fine_scale: each(&|f| f.fine_scale),
+        }
     }
 
     /// The next rate from the last one, rad/s, and the difference of the error, counts.

@@ -49,6 +49,11 @@ pub trait Real:
     fn from_i32(n: i32) -> Self;
     /// The nearest value to the integer `n`.
     fn from_i64(n: i64) -> Self;
+    /// The nearest values to two integers.
+    #[inline]
+    fn from_both(both: [i64; 2]) -> [Self; 2] {
+        both.map(Self::from_i64)
+    }
     /// The nearest value to the integer `n`.
     fn from_u64(n: u64) -> Self;
     /// The integer part, saturating; NaN gives 0.
@@ -297,6 +302,34 @@ fn nearest(n: i64) -> f32 {
     }
 }
 
+/// The same of two, which are asked once whether both are small.
+#[inline]
+fn nearest_of_both(both: [i64; 2]) -> [f32; 2] {
+    // Beyond 32 bits the upper word is not the sign of the lower one.
+    let [beyond, other] = both.map(|n| (n >> 32) as i32 ^ (n as i32 >> 31));
+    if beyond | other == 0 {
+        return both.map(|n| n as i32 as f32);
+    }
+    let [a, b] = both;
+    let Both(a, b) = both_nearest(a, b);
+    [a, b]
+}
+
+/// Two numbers that a function of C gives in registers.
+#[repr(C)]
+struct Both(f32, f32);
+
+// A function of its own, and of C: its caller then has nothing of it in memory.
+#[cold]
+#[inline(never)]
+extern "C" fn both_nearest(a: i64, b: i64) -> Both {
+    let of = |n: i64| {
+        let size = nearest_wide(n.unsigned_abs());
+        if n < 0 { -size } else { size }
+    };
+    Both(of(a), of(b))
+}
+
 /// The same without a sign.
 #[inline]
 fn nearest_unsigned(n: u64) -> f32 {
@@ -348,6 +381,10 @@ impl Real for f32 {
     #[inline]
     fn from_i64(n: i64) -> f32 {
         if WORDS_OF_32_BITS { nearest(n) } else { n as f32 }
+    }
+    #[inline]
+    fn from_both(both: [i64; 2]) -> [f32; 2] {
+        if WORDS_OF_32_BITS { nearest_of_both(both) } else { both.map(|n| n as f32) }
     }
     #[inline]
     fn from_u64(n: u64) -> f32 {
@@ -436,6 +473,9 @@ mod tests {
                 let n = (1_i64 << power).wrapping_add(off);
                 assert_eq!(nearest(n), n as f32, "{n}");
                 assert_eq!(nearest(n.wrapping_neg()), n.wrapping_neg() as f32, "-{n}");
+                for both in [[n, off], [off, n.wrapping_neg()], [n, n.wrapping_neg()]] {
+                    assert_eq!(nearest_of_both(both), both.map(|n| n as f32), "{both:?}");
+                }
                 assert_eq!(nearest_unsigned(n as u64), n as u64 as f32, "{n} unsigned");
             }
         }

@@ -107,7 +107,8 @@ pub struct Servo<T, C = Law<T>> {
     encoder: Encoder,
     dac: Dac<T>,
     period: Micros,
-    radians_per_count: T,
+    /// Radians of 2⁻¹⁶ counts.
+    fine_radians: T,
 }
 
 /// The actuator's voltage since the last tick, as the servo was told or as its own code.
@@ -176,7 +177,8 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
             encoder: p.encoder,
             dac: Dac::new(&p.dac)?,
             period: p.period,
-            radians_per_count: p.encoder.radians_per_count(),
+            // By a power of two: a product with it has the same bits.
+            fine_radians: FixedCounts(1).minus::<T>(FixedCounts(0)) * p.encoder.radians_per_count(),
         })
     }
 
@@ -244,7 +246,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         state.last = Counts::default();
         state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
         state.velocity = self.velocity.start(position, target, applied);
-        self.law.restart(&mut state.law, &self.measure(position, target, T::ZERO), applied);
+        self.law.restart(&mut state.law, &self.measure(T::from_i64(state.error.0), target, T::ZERO), applied);
         self.law.sees(&mut state.law, || Seen { position, applied, place: Place::default() });
         state.applied = Applied::Volts(applied);
     }
@@ -284,26 +286,29 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         target: &Target<T>,
         map: impl FnOnce(FixedCounts) -> Place<T>,
     ) -> ServoOutput<T, C::Terms> {
-        self.step(state, position, target, map(position))
+        state.position = position;
+        self.step(state, target, map(position))
     }
 
-    // Not generic over a closure: a board has its code once.
+    // Not generic over a closure: a board has its code once. The position is in the state: its arguments are in registers then.
     fn step(
         &self,
         state: &mut ServoState<T, C::State>,
-        position: FixedCounts,
         target: &Target<T>,
         place: Place<T>,
     ) -> ServoOutput<T, C::Terms> {
-        state.position = position;
-        state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
+        let position = state.position;
+        let error = target.position.0.wrapping_sub(position.0);
+        // Both at once, and before anything else: a call for numbers of 64 bits finds no registers in use.
+        let [counts, moved] = T::from_both([error, error.wrapping_sub(state.error.0)]);
+        state.error = FixedCounts(error);
         let before = state.applied;
         let applied = || match before {
             Applied::Volts(volts) => volts,
             Applied::Code(code) => self.dac.volts(code),
         };
-        let error_rate = self.velocity.update(&mut state.velocity, position, target, applied);
-        let tick = self.measure(position, target, error_rate);
+        let error_rate = self.velocity.update(&mut state.velocity, position, target, moved, applied);
+        let tick = self.measure(counts, target, error_rate);
         self.law.sees(&mut state.law, || Seen { position, applied: applied(), place });
         let command = self.shell.around(self.law.update(&mut state.law, &tick), &tick);
         let code = self.dac.code(command.voltage);
@@ -334,11 +339,11 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         (state.position, state.last, state.applied) = before;
     }
 
+    /// `error`: 2⁻¹⁶ counts.
     #[inline]
-    fn measure(&self, position: FixedCounts, target: &Target<T>, error_rate: T) -> Tick<T> {
-        let counts: T = target.position.minus(position);
+    fn measure(&self, error: T, target: &Target<T>, error_rate: T) -> Tick<T> {
         Tick {
-            error: counts * self.radians_per_count,
+            error: error * self.fine_radians,
             error_rate,
             target_velocity: target.velocity,
             target_acceleration: target.acceleration,

@@ -3,7 +3,7 @@
 
 #[cfg(feature = "linalg")]
 use crate::counts_over_time::{CountsOverTime, CountsOverTimeParams, CountsOverTimeState};
-use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
+use crate::derivative::{SmoothedDerivative, SmoothedDerivativeParams};
 #[cfg(feature = "linalg")]
 use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
 #[cfg(feature = "linalg")]
@@ -47,7 +47,8 @@ pub enum VelocitySource<T> {
 /// Memory of a velocity source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityState<T> {
-    derivative: DerivativeState<T>,
+    /// `ė` of (5).
+    rate: T,
     #[cfg(feature = "linalg")]
     counts_over_time: CountsOverTimeState<T>,
     #[cfg(feature = "linalg")]
@@ -91,9 +92,9 @@ impl<T: Real> VelocitySource<T> {
     #[inline(never)]
     #[must_use]
     pub fn start(&self, position: FixedCounts, target: &Target<T>, applied: T) -> VelocityState<T> {
-        let _ = applied;
+        let _ = (position, target, applied);
         VelocityState {
-            derivative: DerivativeState::at(FixedCounts(target.position.0.wrapping_sub(position.0))),
+            rate: T::ZERO,
             #[cfg(feature = "linalg")]
             counts_over_time: match self {
                 VelocitySource::CountsOverTime(m) => m.start(position, target.velocity),
@@ -112,20 +113,22 @@ impl<T: Real> VelocitySource<T> {
         }
     }
 
-    /// One sample: position and target in, error rate `ė` out, rad/s. `volts` is what the
-    /// brake was given since the last sample.
+    /// One sample: position and target in, error rate `ė` out, rad/s. `moved` is the way of the error since the last
+    /// sample, 2⁻¹⁶ counts, `volts` what the brake was given since.
     #[inline]
     pub fn update(
         &self,
         state: &mut VelocityState<T>,
         position: FixedCounts,
         target: &Target<T>,
+        moved: T,
         volts: impl FnOnce() -> T,
     ) -> T {
-        let _ = &volts;
+        let _ = (position, target, &volts);
         match self {
             VelocitySource::SmoothedDerivative(d) => {
-                d.update(&mut state.derivative, FixedCounts(target.position.0.wrapping_sub(position.0)))
+                state.rate = d.smooth_fine(state.rate, moved);
+                state.rate
             }
             #[cfg(feature = "linalg")]
             VelocitySource::CountsOverTime(m) => {
@@ -168,7 +171,8 @@ mod tests {
         let mut rate = 0.0;
         for k in 1..3000 {
             let read = FixedCounts::from_counts(counts(shaft, k).floor() as i64);
-            rate = source.update(&mut state, read, &target(k), || volts);
+            // It asks position and target alone.
+            rate = source.update(&mut state, read, &target(k), 0.0, || volts);
         }
         assert!((rate - (path - shaft)).to_degrees().abs() < 0.2, "{} °/s", rate.to_degrees());
     }

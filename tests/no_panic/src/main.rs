@@ -264,7 +264,7 @@ fn velocity<T: Real>() {
         made(VelocitySource::new(&any::<T, VelocityParams<T>>(), &plant, encoder::<T>(), micros()))
     {
         let mut state = opaque(v.start(fixed(), &target(), real()));
-        sink(v.update(&mut state, fixed(), &target(), real::<T>));
+        sink(v.update(&mut state, fixed(), &target(), real(), real::<T>));
         sink(state);
     }
 }
