@@ -7,7 +7,7 @@ use clutch_log::{CommandRecord, Record, SampleRecord};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::{ControllerNode, Notice, Outbox};
 use clutch_sim::Scenario;
-use clutch_wire::{Armed, BoardState, Configured, Frame, Message, Sample as SampleFrame, encode};
+use clutch_wire::{Armed, BoardState, Configured, Decoder, Frame, Message, Sample as SampleFrame, encode};
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -76,7 +76,8 @@ fn frame(tick: u64) -> Frame {
 }
 
 /// A controller whose board is armed.
-fn armed<T: Real>(built: &BuiltRun<T>) -> ControllerNode<T> {
+fn armed<T: Real>(built: &BuiltRun<T>) -> (ControllerNode<T>, Decoder) {
+    let mut line = Decoder::new();
     let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let mut out = Outbox::default();
     let path = |_| Target { position: FixedCounts(0), velocity: T::ZERO, acceleration: T::ZERO };
@@ -84,9 +85,9 @@ fn armed<T: Real>(built: &BuiltRun<T>) -> ControllerNode<T> {
         Message::Configured(Configured { run: 7, config: built.controller.config, boot: 1 }),
         Message::Armed(Armed { run: 7, config: built.controller.config }),
     ] {
-        node.receive(0, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
+        node.receive(0, &mut line, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
     }
-    node
+    (node, line)
 }
 
 fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
@@ -97,11 +98,11 @@ fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Plan
             black_box(frame(black_box(tick)))
         });
     });
-    let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
+    let ((mut controller, mut line), mut out, mut tick) = (armed(built), Outbox::default(), 0);
     group.bench_function("sample's frame made, bytes in, bytes out", |b| {
         b.iter(|| {
             let bytes = frame(tick);
-            controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |_| ());
+            controller.receive(tick * 1_000_000, &mut line, bytes.as_bytes(), path, &mut out, &mut |_| ());
             tick += 1;
             black_box(out.as_bytes().len());
             out.clear();
@@ -112,14 +113,14 @@ fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Plan
 
 /// The time that a log adds.
 fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
-    let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
+    let ((mut controller, mut line), mut out, mut tick) = (armed(built), Outbox::default(), 0);
     let (mut ring, mut drain) = rtrb::RingBuffer::<Record>::new(1 << 15);
     let servo = built.servo;
     let radians = servo.encoder().radians_per_count::<f64>();
     group.bench_function("the same, and both records into the ring", |b| {
         b.iter(|| {
             let bytes = frame(tick);
-            controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |n| {
+            controller.receive(tick * 1_000_000, &mut line, bytes.as_bytes(), path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
                     let _ = ring.push(Record::Sample(SampleRecord::of(&n, tick, 0, 0, radians)));
                     let _ =

@@ -15,7 +15,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    HostNode, OneChip, Outbox, Outboxes, ResetCause, Role,
+    HostNode, Lines, OneChip, Outbox, ResetCause, Role,
 };
 use clutch_settings::{Built, RunParams, RunTimes, SETTINGS, Settings};
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
@@ -161,8 +161,9 @@ struct Bench {
     built: Built,
     host: HostNode,
     board_controller: BoardController,
-    outboxes: Outboxes,
+    lines: Lines,
     board: BoardNode,
+    to_board: Decoder,
     up: Outbox,
     chip: OneChip,
     chip_host: HostNode,
@@ -193,8 +194,9 @@ impl Bench {
             chip_host: host.clone(),
             host,
             board_controller: BoardController::new(this),
-            outboxes: Outboxes::default(),
+            lines: Lines::default(),
             board: BoardNode::new(&BOARD).expect("a board"),
+            to_board: Decoder::new(),
             up: Outbox::default(),
             chip: OneChip::new(this, &BOARD).expect("a board"),
             now_us: 1 << 31,
@@ -209,7 +211,7 @@ impl Bench {
     /// Bytes from the host, to both.
     fn host(&mut self, bytes: &[u8]) {
         let now_ns = self.now_ns();
-        let Outboxes { host, daq } = &mut self.outboxes;
+        let Lines { host, daq, .. } = &mut self.lines;
         self.board_controller.host(now_ns, bytes, host, daq);
         self.chip.receive(self.now_us, bytes, &mut |_| ());
         self.settle();
@@ -223,7 +225,7 @@ impl Bench {
                 self.chip.receive(self.now_us, out.as_bytes(), &mut |_| ());
             } else {
                 let now_ns = self.now_ns();
-                let Outboxes { host, daq } = &mut self.outboxes;
+                let Lines { host, daq, .. } = &mut self.lines;
                 self.board_controller.host(now_ns, out.as_bytes(), host, daq);
             }
         }
@@ -236,24 +238,24 @@ impl Bench {
         let (path, knots) = (&self.built.path, self.settings.knots());
         let at = |tick| path.target(knots, tick);
         for _ in 0..4 {
-            let (bytes, messages) = frames(&mut self.outboxes.daq);
+            let (bytes, messages) = frames(&mut self.lines.daq);
             for message in messages {
                 if let Message::Actuate(m) = message {
                     // A run of other settings may have another converter.
                     assert!(m.run != 5 || m.code <= self.top, "{m:?}");
                 }
             }
-            self.board.receive(self.now_us as u32, &bytes, &mut self.up);
+            self.board.receive(self.now_us as u32, &mut self.to_board, &bytes, &mut self.up);
             let (bytes, _) = frames(&mut self.up);
             if !bytes.is_empty() {
-                let Outboxes { host, daq } = &mut self.outboxes;
-                self.board_controller.daq(now_ns, &bytes, host, daq);
+                let Lines { host, daq, from_daq } = &mut self.lines;
+                self.board_controller.daq(now_ns, from_daq, &bytes, host, daq);
             }
-            let (bytes, _) = frames(&mut self.outboxes.host);
+            let (bytes, _) = frames(&mut self.lines.host);
             self.host.receive(now_ns, &bytes, &at, &mut |_| ());
             let (bytes, _) = frames(self.chip.outbox());
             self.chip_host.receive(now_ns, &bytes, &at, &mut |_| ());
-            if self.outboxes.daq.is_empty() {
+            if self.lines.daq.is_empty() {
                 break;
             }
         }
@@ -277,7 +279,7 @@ impl Bench {
     fn boards_pass(&mut self, us: u64) {
         self.now_us = self.now_us.saturating_add(us);
         let now_ns = self.now_ns();
-        let Outboxes { host, daq } = &mut self.outboxes;
+        let Lines { host, daq, .. } = &mut self.lines;
         self.board_controller.poll(now_ns, host, daq);
         // At the end of all times there is no later.
         assert!(self.board_controller.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
@@ -353,8 +355,8 @@ impl Bench {
             12 => {
                 let frame = input.frame();
                 let now_ns = self.now_ns();
-                let Outboxes { host, daq } = &mut self.outboxes;
-                self.board_controller.daq(now_ns, &frame, host, daq);
+                let Lines { host, daq, from_daq } = &mut self.lines;
+                self.board_controller.daq(now_ns, from_daq, &frame, host, daq);
                 self.settle();
             }
             13 => {
@@ -368,8 +370,8 @@ impl Bench {
                 let bytes = input.some(length);
                 self.host(&bytes);
                 let now_ns = self.now_ns();
-                let Outboxes { host, daq } = &mut self.outboxes;
-                self.board_controller.daq(now_ns, &bytes, host, daq);
+                let Lines { host, daq, from_daq } = &mut self.lines;
+                self.board_controller.daq(now_ns, from_daq, &bytes, host, daq);
                 self.settle();
             }
             _ => {

@@ -79,6 +79,7 @@ impl Shown {
 /// The board in Rust, seen as that in C.
 struct RustBoard {
     node: BoardNode,
+    line: Decoder,
     out: Outbox,
 }
 
@@ -88,8 +89,9 @@ impl RustBoard {
         match event {
             Event::Power(p) => {
                 self.node = BoardNode::new(p).expect("the parameters are right");
+                self.line = Decoder::new();
             }
-            Event::Bytes { now, bytes } => self.node.receive(*now, bytes, out),
+            Event::Bytes { now, bytes } => self.node.receive(*now, &mut self.line, bytes, out),
             Event::Tick { now, counts, faults } => {
                 let encoder = faults & STATUS_ENCODER_FAULT != 0;
                 let converter = faults & STATUS_DAC_FAULT != 0;
@@ -357,7 +359,7 @@ fn sequence(seed: u64) -> Vec<(Event, Shown)> {
     }
     let params = Host::params(&mut random);
     let node = BoardNode::new(&params).expect("the parameters are right");
-    let mut board = RustBoard { node, out: Outbox::default() };
+    let mut board = RustBoard { node, line: Decoder::new(), out: Outbox::default() };
     let power = Event::Power(params);
     let first = board.take(&power);
     let mut steps = vec![(power, first)];
@@ -417,7 +419,7 @@ fn long_run() -> Vec<(Event, Shown)> {
         brown_out_low: true,
     };
     let node = BoardNode::new(&params).expect("the parameters are right");
-    let mut board = RustBoard { node, out: Outbox::default() };
+    let mut board = RustBoard { node, line: Decoder::new(), out: Outbox::default() };
     let configure = Configure {
         run: 1,
         config: 2,

@@ -5,7 +5,7 @@ use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::{ControllerNode, Outbox};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
-use clutch_wire::{Armed, BoardState, Configured, Message, Sample, encode};
+use clutch_wire::{Armed, BoardState, Configured, Decoder, Message, Sample, encode};
 
 #[test]
 fn samples_that_pile_up_before_consent_do_not_end_the_run() {
@@ -16,11 +16,11 @@ fn samples_that_pile_up_before_consent_do_not_end_the_run() {
     let (run, config) = (1, built.controller.config);
     let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let path = from_scenario::path::<f64>(&scenario).unwrap();
-    let mut out = Outbox::default();
+    let (mut line, mut out) = (Decoder::new(), Outbox::default());
     let mut hear = |node: &mut ControllerNode<f64>, now_ns: u64, messages: &[Message]| {
         let bytes: Vec<u8> = messages.iter().flat_map(|m| encode(m).as_bytes().to_vec()).collect();
         out.clear();
-        node.receive(now_ns, &bytes, &path, &mut out, &mut |_| ());
+        node.receive(now_ns, &mut line, &bytes, &path, &mut out, &mut |_| ());
         !out.as_bytes().is_empty()
     };
     let sample = |sequence: u16, state: BoardState| {

@@ -118,7 +118,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         (path.path)(tick)
     };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut station = ControllerStation { node, path: &path };
+    let mut station = ControllerStation::new(node, &path);
     let hello = Talk::new(&mut port, &mut station).discover(Duration::from_secs(5)).unwrap();
     assert_eq!(hello.board, PATIENT_BOARD);
     let mut built = BuiltRun::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
@@ -126,7 +126,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     // As much as a session gives a patient board: a stalled machine is not the subject.
     built.controller.silence = clutch_core::Micros(5_500_000);
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut station = ControllerStation { node, path: &path };
+    let mut station = ControllerStation::new(node, &path);
     let mut talk = Talk::new(&mut port, &mut station);
     talk.configure(DacCode(hello.boot_code)).unwrap();
     let clock = talk.clock(None).unwrap();

@@ -189,8 +189,7 @@ fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::virtual_time
     let params = VirtualOptions { record: true, duration: 2.999, ..VirtualOptions::default() };
     let path = from_scenario::path::<T>(scenario).expect("a path");
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut world =
-        VirtualLoop::new(scenario, params, ControllerStation { node, path: &path }).expect("a rig");
+    let mut world = VirtualLoop::new(scenario, params, ControllerStation::new(node, &path)).expect("a rig");
     world.run(&path).expect("a run")
 }
 
@@ -244,8 +243,8 @@ fn healthy_runs_on_ramps_are_never_ended() {
                     VirtualOptions { latency_ns: 80_000, seed, duration: 20.0, ..VirtualOptions::default() };
                 let path = from_scenario::path::<f32>(&scenario).expect("a path");
                 let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-                let mut world = VirtualLoop::new(&scenario, params, ControllerStation { node, path: &path })
-                    .expect("a rig");
+                let mut world =
+                    VirtualLoop::new(&scenario, params, ControllerStation::new(node, &path)).expect("a rig");
                 let report = world.run(&path).expect("a run");
                 assert_eq!(report.cause, None, "{law} at {rate} °/s on {rig}, seed {seed}: a nuisance trip");
             }
@@ -261,8 +260,7 @@ fn motor(name: &str, set: &[(&str, String)], faults: Vec<Fault>) -> Option<Cause
     let params = VirtualOptions { latency_ns: 80_000, duration: 10.0, faults, ..VirtualOptions::default() };
     let path = from_scenario::path::<f32>(&scenario).expect("a path");
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut world =
-        VirtualLoop::new(&scenario, params, ControllerStation { node, path: &path }).expect("a rig");
+    let mut world = VirtualLoop::new(&scenario, params, ControllerStation::new(node, &path)).expect("a rig");
     world.run(&path).expect("a run").cause
 }
 

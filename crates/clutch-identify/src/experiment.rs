@@ -500,7 +500,7 @@ impl PartRunner {
         };
         let (dac, servo) = (*built.servo.dac(), built.servo);
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-        let on_rig = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })
+        let on_rig = VirtualLoop::new(scenario, options, ControllerStation::new(node, &path))
             .map_err(VirtualError::from)?;
         let header = |version: &str| {
             from_scenario::header(scenario, &servo, Source::Loop, "simulated, in virtual time", version)

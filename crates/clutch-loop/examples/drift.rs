@@ -124,7 +124,7 @@ fn watch_in<T: Real>(
     let options =
         VirtualOptions { latency_ns: 50_000, duration, faults, record: true, ..VirtualOptions::default() };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut world = VirtualLoop::new(run, options, ControllerStation { node, path: &path })?;
+    let mut world = VirtualLoop::new(run, options, ControllerStation::new(node, &path))?;
     let report = world.run(&path)?;
     let mut detector = Detector::new(&run.spec(), Keep::Trace)?;
     let (samples, commands) = report.samples_and_commands();

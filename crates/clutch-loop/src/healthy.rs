@@ -124,7 +124,7 @@ impl HealthyShaft {
             options.faults = vec![lost, jitter];
         }
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-        let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?;
+        let mut world = VirtualLoop::new(scenario, options, ControllerStation::new(node, &path))?;
         Ok(world.run(&path)?)
     }
 }

@@ -1,7 +1,7 @@
 //! A board controller that is asked in lockstep, and one in this process.
 
 use clutch_node::controller_lockstep::{Exchange, answer};
-use clutch_node::{BoardController, BoardControllerParams, Outboxes};
+use clutch_node::{BoardController, BoardControllerParams, Lines};
 
 /// A board that answers in lockstep.
 pub trait LockstepBoard {
@@ -15,18 +15,18 @@ pub trait LockstepBoard {
 /// The board's state machine in this process: what an image runs, compiled for this machine.
 pub struct InProcessBoard {
     node: BoardController,
-    outboxes: Outboxes,
+    lines: Lines,
 }
 
 impl Default for InProcessBoard {
     fn default() -> Self {
         let node = BoardController::new(BoardControllerParams { board: 1, boot: 1, clock_hz: 0 });
-        InProcessBoard { node, outboxes: Outboxes::default() }
+        InProcessBoard { node, lines: Lines::default() }
     }
 }
 
 impl LockstepBoard for InProcessBoard {
     fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        Ok(answer(&mut self.node, request, &mut self.outboxes))
+        Ok(answer(&mut self.node, request, &mut self.lines))
     }
 }

@@ -283,7 +283,7 @@ fn judged(scenario: &Scenario, faults: Vec<Fault>) -> Result<Option<Cause>, Camp
         ..VirtualOptions::default()
     };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?;
+    let mut world = VirtualLoop::new(scenario, options, ControllerStation::new(node, &path))?;
     Ok(world.run(&path)?.cause)
 }
 

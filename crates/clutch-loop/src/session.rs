@@ -818,7 +818,7 @@ impl Course<'_> {
 }
 
 fn controller<T: Real, P>(built: &BuiltRun<T>, path: P) -> ControllerStation<T, Law<T>, P> {
-    ControllerStation { node: ControllerNode::new(built.controller, built.servo, built.supervisor), path }
+    ControllerStation::new(ControllerNode::new(built.controller, built.servo, built.supervisor), path)
 }
 
 fn host<'a>(

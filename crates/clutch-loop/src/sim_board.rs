@@ -7,7 +7,7 @@ use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
 use clutch_sim::{MovingRig, RunError, Scenario, ScenarioError};
-use clutch_wire::{BoardState, ResetCause};
+use clutch_wire::{BoardState, Decoder, ResetCause};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -49,6 +49,7 @@ pub const STRICT_BOARD: u32 = 1;
 pub struct SimBoard {
     params: BoardParams,
     node: BoardNode,
+    line: Decoder,
     rig: MovingRig,
     dac: Dac<f64>,
     faults: Vec<Fault>,
@@ -132,6 +133,7 @@ impl SimBoard {
         Ok(SimBoard {
             params,
             node,
+            line: Decoder::new(),
             rig: MovingRig::new(rig, engine, spec.run.seed, (start, 0.0), volts),
             dac,
             faults: faults.to_vec(),
@@ -229,7 +231,8 @@ impl SimBoard {
     pub fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), SimBoardError> {
         self.move_to(now_ns)?;
         let before = self.node.state();
-        self.node.receive(self.clock_us(now_ns), bytes, out);
+        let now_us = self.clock_us(now_ns);
+        self.node.receive(now_us, &mut self.line, bytes, out);
         if self.node.state() == BoardState::Armed && before != BoardState::Armed {
             self.armed_ns = Some(now_ns);
         }
@@ -316,6 +319,7 @@ impl SimBoard {
             self.reset_done = true;
             self.params.boot = self.params.boot.wrapping_add(1);
             self.node = BoardNode::new(&self.params)?;
+            self.line = Decoder::new();
             self.next_sample_ns = None;
             self.rig.reset(self.volts());
             return Ok(());

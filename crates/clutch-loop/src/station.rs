@@ -8,7 +8,7 @@ use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real, Servo};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_settings::Settings;
-use clutch_wire::{Set, StopReason};
+use clutch_wire::{Decoder, Set, StopReason};
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
@@ -89,6 +89,15 @@ pub struct ControllerStation<T: Real, C: ControlLaw<T>, P> {
     pub node: ControllerNode<T, C>,
     /// The path, from position 0 on, and the map of the disc.
     pub path: P,
+    /// Reads the board's frames.
+    line: Decoder,
+}
+
+impl<T: Real, C: ControlLaw<T>, P> ControllerStation<T, C, P> {
+    /// A controller at a line that has carried nothing yet.
+    pub fn new(node: ControllerNode<T, C>, path: P) -> Self {
+        ControllerStation { node, path, line: Decoder::new() }
+    }
 }
 
 impl<T: Real, C: ControlLaw<T> + Send, P: Planned<T>> Station for ControllerStation<T, C, P> {
@@ -131,7 +140,7 @@ impl<T: Real, C: ControlLaw<T> + Send, P: Planned<T>> Station for ControllerStat
         out: &mut Outbox,
         notices: &mut impl FnMut(StationNotice<Self>),
     ) {
-        self.node.receive(now_ns, bytes, &self.path, out, notices);
+        self.node.receive(now_ns, &mut self.line, bytes, &self.path, out, notices);
     }
     fn tune(&mut self, servo: Servo<T, C>) {
         self.node.tune(servo);

@@ -45,7 +45,7 @@ fn watched(scenario: &Scenario, bounds: &Bounds<f64>, faults: &[&str]) -> (Vec<A
         ..VirtualOptions::default()
     };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path }).unwrap();
+    let mut world = VirtualLoop::new(scenario, options, ControllerStation::new(node, &path)).unwrap();
     let report = world.run(&path).unwrap();
     assert_eq!(report.cause, None, "control went on");
     let (samples, commands) = report.samples_and_commands();

@@ -151,7 +151,6 @@ const RECENT: usize = 8;
 #[derive(Clone, Debug)]
 pub struct BoardNode {
     params: BoardParams,
-    decoder: Decoder,
     state: BoardState,
     run: u16,
     config: u64,
@@ -182,9 +181,14 @@ impl BoardNode {
     /// Those of [`BoardParams::check`].
     pub fn new(p: &BoardParams) -> Result<Self, BoardMisfit> {
         p.check()?;
-        Ok(BoardNode {
+        Ok(BoardNode::of(p))
+    }
+
+    /// The same of parameters that were checked.
+    #[inline]
+    pub(crate) fn of(p: &BoardParams) -> Self {
+        BoardNode {
             params: *p,
-            decoder: Decoder::new(),
             state: BoardState::Boot,
             run: 0,
             config: 0,
@@ -201,7 +205,7 @@ impl BoardNode {
             late: false,
             safe_under_way: false,
             armed_at: 0,
-        })
+        }
     }
 
     /// The code that the converter is to give now.
@@ -246,13 +250,13 @@ impl BoardNode {
         matches!(self.state, BoardState::Armed | BoardState::Running)
     }
 
-    /// Bytes from the controller.
-    pub fn receive(&mut self, now_us: u32, bytes: &[u8], out: &mut impl Sink) {
+    /// Bytes from the controller, over a line whose frames `line` reads.
+    pub fn receive(&mut self, now_us: u32, line: &mut Decoder, bytes: &[u8], out: &mut impl Sink) {
         // Also where no message is whole: a code that comes after the watchdog's time does not undo what that does.
         self.poll(now_us, out);
         for byte in bytes {
             // A frame that is not whole is dropped without a word.
-            if let Some(Ok(message)) = self.decoder.push(*byte) {
+            if let Some(Ok(message)) = line.push(*byte) {
                 self.message(now_us, &message, out);
             }
         }

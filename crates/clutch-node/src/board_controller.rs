@@ -63,8 +63,6 @@ pub struct BoardController {
     settings_run: u16,
     /// Numbers with which the targets of a table are computed.
     prepared: Prepared,
-    /// Hears encoder and converter while there is no run.
-    introduced: Decoder,
     /// Encoder and converter, once they have answered.
     hello: Option<Hello>,
     run: Option<Run>,
@@ -95,6 +93,7 @@ macro_rules! report {
 
 impl BoardController {
     /// A board at power-up.
+    #[inline] // in place: a copy of it would be on the stack of who keeps it
     #[must_use]
     pub fn new(params: BoardControllerParams) -> Self {
         BoardController {
@@ -103,7 +102,6 @@ impl BoardController {
             settings: Settings::default(),
             settings_run: 0,
             prepared: Prepared::default(),
-            introduced: Decoder::new(),
             hello: None,
             run: None,
             heard_ns: 0,
@@ -187,11 +185,18 @@ impl BoardController {
         }
     }
 
-    /// Bytes from encoder and converter.
-    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], host: &mut Outbox, daq: &mut impl Sink) {
+    /// Bytes from encoder and converter, over a line whose frames `line` reads.
+    pub fn daq(
+        &mut self,
+        now_ns: u64,
+        line: &mut Decoder,
+        bytes: &[u8],
+        host: &mut Outbox,
+        daq: &mut impl Sink,
+    ) {
         let Some(run) = &mut self.run else {
             for byte in bytes {
-                if let Some(Ok(message)) = self.introduced.push(*byte) {
+                if let Some(Ok(message)) = line.push(*byte) {
                     introduction(&mut self.hello, &message, host);
                 }
             }
@@ -201,7 +206,7 @@ impl BoardController {
         let (path, knots, prepared) = (&run.path, self.settings.knots(), &self.prepared);
         let at = |tick: u64| path.target_with(knots, prepared, tick);
         let mut report = report!(self, run, host);
-        run.control.receive(now_ns, bytes, &at, daq, &mut |n| report.notice(n));
+        run.control.receive(now_ns, line, bytes, &at, daq, &mut |n| report.notice(n));
         self.follow(now_ns, drove, host, daq);
     }
 

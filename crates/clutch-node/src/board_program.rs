@@ -12,7 +12,7 @@
 use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros};
-use clutch_wire::Message;
+use clutch_wire::{Decoder, Message};
 
 /// The functions that a board's one file gives. None of them may wait.
 pub trait Hardware {
@@ -92,6 +92,8 @@ pub fn tick(role: &mut impl Role, hardware: &mut impl Hardware) {
 }
 
 /// Bytes from the host. A code among them goes out at once; the watchdog gets nothing from them.
+// A function of its own in machine code, too: its stack is that of a configuration.
+#[inline(never)]
 pub fn receive(role: &mut impl Role, hardware: &mut impl Hardware, bytes: &[u8]) {
     role.receive(hardware.now_us(), bytes, &mut |code| hardware.put_out(code));
     send(role, hardware);
@@ -108,6 +110,7 @@ fn send(role: &mut impl Role, hardware: &mut impl Hardware) {
 #[derive(Clone, Debug)]
 pub struct DaqBoard {
     node: BoardNode,
+    line: Decoder,
     outbox: Outbox,
 }
 
@@ -117,13 +120,13 @@ impl DaqBoard {
     /// # Errors
     /// Those of [`BoardParams::check`].
     pub fn new(params: &BoardParams) -> Result<Self, BoardMisfit> {
-        Ok(DaqBoard { node: BoardNode::new(params)?, outbox: Outbox::default() })
+        Ok(DaqBoard { node: BoardNode::new(params)?, line: Decoder::new(), outbox: Outbox::default() })
     }
 }
 
 impl Role for DaqBoard {
     fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
-        self.node.receive(now_us as u32, bytes, &mut self.outbox);
+        self.node.receive(now_us as u32, &mut self.line, bytes, &mut self.outbox);
         put_out(self.node.code());
     }
 

@@ -40,7 +40,6 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     servo: Servo<T, C>,
     supervisor: Supervisor<T>,
     state: SupervisorState<T, C::State>,
-    decoder: Decoder,
     counts: LinkCounts,
     /// The code that the converter has before the first answer.
     present: DacCode,
@@ -63,7 +62,6 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             servo,
             supervisor,
             state: SupervisorState::default(),
-            decoder: Decoder::new(),
             counts: LinkCounts::default(),
             present: supervisor.safe_codes().hold,
             origin: FixedCounts::default(),
@@ -197,10 +195,11 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         }
     }
 
-    /// Bytes from the board. The path is planned from position 0 on.
+    /// Bytes from the board, over a line whose frames `line` reads. The path is planned from position 0 on.
     pub fn receive(
         &mut self,
         now_ns: u64,
+        line: &mut Decoder,
         bytes: &[u8],
         planned: &impl Planned<T>,
         out: &mut impl Sink,
@@ -209,7 +208,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         // A sample waits until it is known whether a newer one came with it.
         let mut waiting: Option<Sample> = None;
         for byte in bytes {
-            let message = match self.decoder.push(*byte) {
+            let message = match line.push(*byte) {
                 None => continue,
                 Some(Ok(message)) => message,
                 Some(Err(error)) => {

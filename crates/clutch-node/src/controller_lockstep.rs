@@ -11,6 +11,7 @@
 use crate::board_controller::BoardController;
 use crate::outbox::Outbox;
 use clutch_core::Micros;
+use clutch_wire::Decoder;
 
 /// Bytes before those that are carried.
 pub const HEAD: usize = 16;
@@ -72,22 +73,20 @@ impl<'a> Exchange<'a> {
     }
 }
 
-/// Frames on their way out of a controller at two lines.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Outboxes {
-    /// To the host.
+/// The lines of a controller that has two.
+#[derive(Clone, Debug, Default)]
+pub struct Lines {
+    /// Frames on their way to the host.
     pub host: Outbox,
-    /// To encoder and converter.
+    /// Frames on their way to encoder and converter.
     pub daq: Outbox,
+    /// Reads the frames of encoder and converter.
+    pub from_daq: Decoder,
 }
 
 /// A controller's answer: what has arrived goes in, what is due comes out.
-pub fn answer<'p>(
-    node: &mut BoardController,
-    request: &Exchange<'_>,
-    outboxes: &'p mut Outboxes,
-) -> Exchange<'p> {
-    let Outboxes { host, daq } = outboxes;
+pub fn answer<'p>(node: &mut BoardController, request: &Exchange<'_>, lines: &'p mut Lines) -> Exchange<'p> {
+    let Lines { host, daq, from_daq } = lines;
     host.clear();
     daq.clear();
     if request.lateness_us > 0 {
@@ -95,7 +94,7 @@ pub fn answer<'p>(
     }
     node.host(request.time_ns, request.host, host, daq);
     if !request.daq.is_empty() {
-        node.daq(request.time_ns, request.daq, host, daq);
+        node.daq(request.time_ns, from_daq, request.daq, host, daq);
     }
     node.poll(request.time_ns, host, daq);
     Exchange {

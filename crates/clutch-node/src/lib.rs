@@ -57,7 +57,7 @@ pub use board_counter::WideCounter;
 pub use board_program::{DaqBoard, Hardware, Role, receive, tick};
 pub use clutch_wire::ResetCause;
 pub use controller::{ControllerNode, ControllerParams};
-pub use controller_lockstep::Outboxes;
+pub use controller_lockstep::Lines;
 pub use host::HostNode;
 pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
 pub use one_chip::OneChip;

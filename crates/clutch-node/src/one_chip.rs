@@ -65,12 +65,20 @@ impl OneChip {
     /// # Errors
     /// Those of [`BoardParams::check`].
     pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, BoardMisfit> {
-        Ok(OneChip {
+        board.check()?;
+        Ok(OneChip::of(controller, board))
+    }
+
+    /// The same where [`BoardParams::check`] has passed: made in the place where it is to be, and not on the stack before.
+    #[inline]
+    #[must_use]
+    pub fn of(controller: BoardControllerParams, board: &BoardParams) -> Self {
+        OneChip {
             controller: BoardController::new(controller),
-            board: BoardNode::new(board)?,
+            board: BoardNode::of(board),
             up: Mail::default(),
-            to_host: Outbox::default(),
-        })
+            to_host: Outbox::new(),
+        }
     }
 
     /// Looks at the clock.

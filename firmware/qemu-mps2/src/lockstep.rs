@@ -4,7 +4,7 @@
 use crate::files::HostFile;
 use crate::last_word;
 use clutch_node::controller_lockstep::{Exchange, LONGEST, answer};
-use clutch_node::{BoardController, Outboxes};
+use clutch_node::{BoardController, Lines};
 use semihosting::process;
 
 /// A request at this time comes from a test: the processor must fail.
@@ -34,7 +34,7 @@ impl Link {
 pub fn run(link: Link, mut node: BoardController) -> ! {
     let mut buffer = [0; LONGEST];
     let mut used = 0;
-    let mut outboxes = Outboxes::default();
+    let mut lines = Lines::default();
     loop {
         // One read brings one request, as its writer writes it in one piece; but nothing guarantees
         // that.
@@ -51,7 +51,7 @@ pub fn run(link: Link, mut node: BoardController) -> ! {
         if request.time_ns == FAIL_AT {
             cortex_m::asm::udf(); // an instruction that is none
         }
-        if !link.answer(&answer(&mut node, &request, &mut outboxes)) {
+        if !link.answer(&answer(&mut node, &request, &mut lines)) {
             process::exit(3);
         }
         last_word::prepare(node.last_word());

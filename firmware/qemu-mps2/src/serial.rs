@@ -3,6 +3,7 @@
 use crate::last_word;
 use clutch_core::Micros;
 use clutch_node::{BoardController, Outbox};
+use clutch_wire::Decoder;
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::interrupt::InterruptNumber;
@@ -197,7 +198,7 @@ pub fn run(mut node: BoardController) -> ! {
     let mut watchdog = Watchdog::start();
     HOST.enable();
     DAQ.enable();
-    let (mut outbox, mut to_daq) = (Outbox::default(), Outbox::default());
+    let (mut outbox, mut to_daq, mut from_daq) = (Outbox::default(), Outbox::default(), Decoder::new());
     let (mut host, mut daq) = ([0; 64], [0; 64]);
     loop {
         let (host_bytes, daq_bytes) = cortex_m::interrupt::free(|cs| {
@@ -212,7 +213,7 @@ pub fn run(mut node: BoardController) -> ! {
         let arrived = clock.now_us();
         let now_ns = arrived.saturating_mul(1000);
         if daq_bytes > 0 {
-            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outbox, &mut to_daq);
+            node.daq(now_ns, &mut from_daq, daq.get(..daq_bytes).unwrap_or(&[]), &mut outbox, &mut to_daq);
         }
         // The answer comes before anything else; a frame from the host to encoder and converter is
         // not an answer.

@@ -48,8 +48,8 @@ use clutch_core::{
 use clutch_node::controller_lockstep::Exchange;
 use clutch_node::{
     Alone, AloneRun, BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode,
-    ControllerParams, DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter,
-    present_code, receive, tick,
+    ControllerParams, DaqBoard, Hardware, HostNode, Lines, OneChip, Outbox, Role, WideCounter, present_code,
+    receive, tick,
 };
 use clutch_settings::{Path, RunParams, Settings};
 use clutch_wire::{BoardState, Configure, Decoder, Hello, ResetCause, StopReason, encode};
@@ -580,10 +580,10 @@ fn board() {
     };
     runner(&params);
     let Some(mut node) = made(BoardNode::new(&params)) else { return };
-    let mut out = opaque(Outbox::default());
+    let (mut line, mut out) = (opaque(Decoder::new()), opaque(Outbox::default()));
     loop {
-        node.receive(word() as u32, bytes(&any_bytes()), &mut out);
-        node = opaque(node);
+        node.receive(word() as u32, &mut line, bytes(&any_bytes()), &mut out);
+        (node, line) = (opaque(node), opaque(line));
         node.sample(word() as u32, Counts(word() as i32), flag(), flag(), &mut out);
         node = opaque(node);
         node.poll(word() as u32, &mut out);
@@ -713,15 +713,15 @@ fn control_node<T: Real>() {
         silence: micros(),
     };
     let mut node = opaque(ControllerNode::new(params, servo, supervisor));
-    let mut out = opaque(Outbox::default());
+    let (mut line, mut out) = (opaque(Decoder::new()), opaque(Outbox::default()));
     let path = |_| target();
     loop {
         node.discover(word() as u32, &mut out);
         node.configure(DacCode(word() as u16), &mut out);
         node.arm(&mut out);
         node.ping(word() as u32, &mut out);
-        node.receive(word(), bytes(&any_bytes()), &path, &mut out, &mut |notice| sink(notice));
-        node = opaque(node);
+        node.receive(word(), &mut line, bytes(&any_bytes()), &path, &mut out, &mut |notice| sink(notice));
+        (node, line) = (opaque(node), opaque(line));
         node.answered(micros());
         node.poll(word(), &mut out, &mut |notice| sink(notice));
         sink((node.poll_at(), node.origin(), *node.counts(), node.state().state()));
@@ -806,19 +806,20 @@ fn sent() {
 
 fn board_controller() {
     let mut node = opaque(BoardController::new(board_controller_params()));
-    let mut out = opaque(Outboxes::default());
+    let mut lines = opaque(Lines::default());
     loop {
-        node.host(word(), bytes(&any_bytes()), &mut out.host, &mut out.daq);
+        let Lines { host, daq, from_daq } = &mut lines;
+        node.host(word(), bytes(&any_bytes()), host, daq);
         node = opaque(node);
-        node.daq(word(), bytes(&any_bytes()), &mut out.host, &mut out.daq);
+        node.daq(word(), from_daq, bytes(&any_bytes()), host, daq);
         node = opaque(node);
-        node.poll(word(), &mut out.host, &mut out.daq);
+        node.poll(word(), host, daq);
         node.spent(word() as u32);
         node.answered(micros());
         sink((node.state(), node.driving(), node.poll_at(), node.last_word()));
-        drain(&mut out.host);
-        drain(&mut out.daq);
-        out = opaque(out);
+        drain(host);
+        drain(daq);
+        lines = opaque(lines);
         if flag() {
             return;
         }

@@ -333,10 +333,10 @@ impl Draw {
             let law = BrokenLaw { law: *built.servo.law(), from };
             let servo = Servo::with_law(&built.params, law).map_err(|e| BuildError::Param(e.cast()))?;
             let node = ControllerNode::new(built.controller, servo, built.supervisor);
-            Ok(VirtualLoop::new(scenario, params, ControllerStation { node, path: &path })?.run(&path)?)
+            Ok(VirtualLoop::new(scenario, params, ControllerStation::new(node, &path))?.run(&path)?)
         } else {
             let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-            Ok(VirtualLoop::new(scenario, params, ControllerStation { node, path: &path })?.run(&path)?)
+            Ok(VirtualLoop::new(scenario, params, ControllerStation::new(node, &path))?.run(&path)?)
         }
     }
 }

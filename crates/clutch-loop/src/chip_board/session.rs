@@ -136,7 +136,7 @@ impl ChipSession {
         let built = BuiltRun::<T>::new(self.admitted.scenario(), 1).map_err(SessionError::from)?;
         let path = from_scenario::path::<T>(self.admitted.scenario()).map_err(SessionError::from)?;
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-        let station = ControllerStation { node, path: &path };
+        let station = ControllerStation::new(node, &path);
         self.drive(image, &built, built.ticks + 1, station, &path)
     }
 

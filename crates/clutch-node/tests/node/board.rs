@@ -29,6 +29,7 @@ const ARM: Arm = Arm { run: 5, config: CONFIG, boot: 9 };
 /// A board on a desk: frames and times in, frames out.
 struct Bench {
     board: BoardNode,
+    line: Decoder,
     /// The board's clock, µs.
     now: u32,
 }
@@ -42,7 +43,7 @@ fn frames(out: &mut Outbox) -> Vec<Message> {
 
 impl Bench {
     fn boot() -> Bench {
-        Bench { board: BoardNode::new(&PARAMS).unwrap(), now: 1_000_000 }
+        Bench { board: BoardNode::new(&PARAMS).unwrap(), line: Decoder::new(), now: 1_000_000 }
     }
 
     fn ready() -> Bench {
@@ -75,7 +76,7 @@ impl Bench {
 
     fn hears(&mut self, message: Message) -> Vec<Message> {
         let mut out = Outbox::default();
-        self.board.receive(self.now, encode(&message).as_bytes(), &mut out);
+        self.board.receive(self.now, &mut self.line, encode(&message).as_bytes(), &mut out);
         frames(&mut out)
     }
 
@@ -657,9 +658,9 @@ fn a_frame_cut_anywhere_is_taken_when_its_last_byte_comes() {
     for cut in 0..code.len() {
         let (mut bench, mut out) = (Bench::running(), Outbox::default());
         bench.samples();
-        bench.board.receive(bench.now, &code[..cut], &mut out);
+        bench.board.receive(bench.now, &mut bench.line, &code[..cut], &mut out);
         assert_eq!(bench.code(), 2500, "{cut} bytes of {}", code.len());
-        bench.board.receive(bench.now, &code[cut..], &mut out);
+        bench.board.receive(bench.now, &mut bench.line, &code[cut..], &mut out);
         assert_eq!(bench.code(), 2600, "cut at {cut}");
     }
 }
@@ -737,11 +738,11 @@ proptest! {
             let (state, code, fed) = (bench.state(), bench.code(), bench.board.watchdog_at());
             let mut stepped = false;
             match input {
-                Input::Bytes(bytes) => bench.board.receive(bench.now, &bytes, &mut out),
-                Input::Frame(frame) => bench.board.receive(bench.now, encode(&frame).as_bytes(), &mut out),
+                Input::Bytes(bytes) => bench.board.receive(bench.now, &mut bench.line, &bytes, &mut out),
+                Input::Frame(frame) => bench.board.receive(bench.now, &mut bench.line, encode(&frame).as_bytes(), &mut out),
                 Input::Answer(code) => {
                     let frame = Message::Actuate(Actuate { run: 5, sequence: newest, code, valid_us: 2000 });
-                    bench.board.receive(bench.now, encode(&frame).as_bytes(), &mut out);
+                    bench.board.receive(bench.now, &mut bench.line, encode(&frame).as_bytes(), &mut out);
                 }
                 Input::Sample(counts, fault) => {
                     bench.board.sample(bench.now, Counts(counts), fault == 1, fault == 2, &mut out);

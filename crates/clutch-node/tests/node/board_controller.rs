@@ -8,11 +8,11 @@ use clutch_core::law::{LawParams, Limit, SmcParams};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_core::{FixedCounts, LimitParams, Micros, SafeState, Servo, SupervisorParams};
-use clutch_node::{BoardController, Ending, HostNode, Notice, Outbox, Outboxes};
+use clutch_node::{BoardController, Ending, HostNode, Lines, Notice, Outbox};
 use clutch_settings::{MAX_KNOTS, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
-    Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Discover, Message, Ping,
-    Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
+    Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Decoder, Discover, Message,
+    Ping, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
 };
 use proptest::prelude::*;
 
@@ -252,7 +252,7 @@ fn a_setting_behind_configure_takes_the_configuration_back() {
 #[test]
 fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
     let mut desk = Desk::ready(Plan::new());
-    let mut arm = Outboxes::default();
+    let mut arm = Lines::default();
     desk.board_controller.host(
         desk.now_ns,
         encode(&Message::Arm(Arm { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot })).as_bytes(),
@@ -261,7 +261,7 @@ fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
     );
     let (key, value) = desk.plan.pairs()[0];
     desk.uploads(&[(key, value)]);
-    desk.board.receive(desk.now_us(), arm.daq.as_bytes(), &mut desk.up);
+    desk.board.receive(desk.now_us(), &mut desk.line, arm.daq.as_bytes(), &mut desk.up);
     assert_eq!((desk.settle(), desk.board.state()), (vec![], BoardState::Armed), "nobody drives it");
     desk.follows(4);
     assert_eq!(desk.board.state(), BoardState::Faulted);
@@ -722,10 +722,10 @@ proptest! {
         let place = place % line.len();
         let lost = if line[place] == 0 { 2 } else { 1 };
         line[place] ^= bits;
-        let (mut board_controller, mut outboxes, mut taken) = (BoardController::new(BOARD_CONTROLLER), Outboxes::default(), Vec::new());
+        let (mut board_controller, mut lines, mut taken) = (BoardController::new(BOARD_CONTROLLER), Lines::default(), Vec::new());
         for byte in line {
-            board_controller.host(0, &[byte], &mut outboxes.host, &mut outboxes.daq);
-            taken.extend(frames(&desk::drain(&mut outboxes.host)));
+            board_controller.host(0, &[byte], &mut lines.host, &mut lines.daq);
+            taken.extend(frames(&desk::drain(&mut lines.host)));
         }
         prop_assert!(taken.len() + lost >= sets.len());
         for m in taken {
@@ -809,7 +809,7 @@ fn there_is_a_last_word_exactly_while_it_drives_and_it_makes_the_board_safe() {
         desk.follows(periods);
         assert!(desk.board_controller.driving());
         let (word, mut board) = (desk.board_controller.last_word().unwrap(), desk.board.clone());
-        board.receive(desk.now_us(), word.as_bytes(), &mut Outbox::default());
+        board.receive(desk.now_us(), &mut Decoder::new(), word.as_bytes(), &mut Outbox::default());
         assert_eq!((board.state(), board.code()), (BoardState::Faulted, plan.supervisor().safe_codes().hold));
     }
     desk.asks(|host, out| host.stop(StopReason::Operator, out));

@@ -39,6 +39,7 @@ fn path(tick: u64) -> Target<f64> {
 /// A controller on a desk; frames in, frames and notices out.
 struct Desk {
     node: ControllerNode<f64>,
+    line: Decoder,
     /// ns
     now: u64,
     /// Number of the next sample, and the counts of the first one.
@@ -62,7 +63,7 @@ impl Desk {
         let bounds = Bounds { drive_torque: clutch_core::Interval { low: 0.0005, high: 10.0 }, ..paper };
         let supervisor = Supervisor::new(&SupervisorParams::new(on_fault), &servo, &bounds).unwrap();
         let node = ControllerNode::new(params, Servo::new(&servo).unwrap(), supervisor);
-        Desk { node, now: 1_000_000_000, sequence: 0, origin: 700, notices: Vec::new() }
+        Desk { node, line: Decoder::new(), now: 1_000_000_000, sequence: 0, origin: 700, notices: Vec::new() }
     }
 
     fn new() -> Desk {
@@ -102,7 +103,7 @@ impl Desk {
         let mut out = Outbox::default();
         let notices = &mut self.notices;
         notices.clear();
-        self.node.receive(self.now, bytes, &path, &mut out, &mut |n| notices.push(n));
+        self.node.receive(self.now, &mut self.line, bytes, &path, &mut out, &mut |n| notices.push(n));
         heard(&mut out)
     }
 
@@ -525,16 +526,16 @@ fn controller_and_board_run_a_thousand_cycles_and_end_as_told() {
             ..BOARD
         };
         let mut board = BoardNode::new(&params).unwrap();
-        let (mut up, mut down) = (Outbox::default(), Outbox::default());
+        let (mut line, mut up, mut down) = (Decoder::new(), Outbox::default(), Outbox::default());
         desk.node.discover(1, &mut down);
         desk.node.configure(board.code(), &mut down);
         for k in 0..1000_u32 {
             let now_us = k * 1000;
-            board.receive(now_us, down.as_bytes(), &mut up);
+            board.receive(now_us, &mut line, down.as_bytes(), &mut up);
             down.clear();
             board.sample(now_us, Counts(k as i32), false, false, &mut up);
             desk.now = u64::from(now_us) * 1000;
-            desk.node.receive(desk.now, up.as_bytes(), &path, &mut down, &mut |_| {});
+            desk.node.receive(desk.now, &mut desk.line, up.as_bytes(), &path, &mut down, &mut |_| {});
             up.clear();
             if k == 3 {
                 desk.node.arm(&mut down);
@@ -546,7 +547,7 @@ fn controller_and_board_run_a_thousand_cycles_and_end_as_told() {
                     "period {k}"
                 );
             }
-            board.receive(now_us + 200, down.as_bytes(), &mut up);
+            board.receive(now_us + 200, &mut line, down.as_bytes(), &mut up);
             down.clear();
             if k > 5 {
                 assert_eq!(board.code(), desk.node.state().code());
@@ -557,11 +558,11 @@ fn controller_and_board_run_a_thousand_cycles_and_end_as_told() {
             board.poll(1_001_200, &mut up);
             assert_eq!(board.state(), BoardState::Running);
             board.poll(1_002_200, &mut up);
-            desk.node.receive(desk.now, up.as_bytes(), &path, &mut down, &mut |_| {});
+            desk.node.receive(desk.now, &mut desk.line, up.as_bytes(), &path, &mut down, &mut |_| {});
             (State::Faulted, BoardState::Faulted)
         } else {
             desk.node.stop(reason, &mut down);
-            board.receive(1_000_000, down.as_bytes(), &mut up);
+            board.receive(1_000_000, &mut line, down.as_bytes(), &mut up);
             (State::Holding, BoardState::Stopped)
         };
         assert_eq!((desk.state(), board.state()), end);
@@ -624,7 +625,7 @@ proptest! {
         let mut answers = 0;
         for (length, passed) in cuts.iter().cycle() {
             let (read, more) = rest.split_at((*length).min(rest.len()));
-            desk.node.receive(desk.now, read, &target, &mut out, &mut |_| {});
+            desk.node.receive(desk.now, &mut desk.line, read, &target, &mut out, &mut |_| {});
             desk.now += passed;
             desk.node.poll(desk.now, &mut out, &mut |_| {});
             for sent in heard(&mut out) {

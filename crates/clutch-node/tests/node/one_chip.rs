@@ -6,8 +6,8 @@ use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Counts, Dac, DacCode, Encoder, LimitParams, Micros, Plant, PlantParams, SupervisorParams};
 use clutch_node::{BoardMisfit, BoardParams, HostNode, Notice, OneChip, Outbox, Role};
 use clutch_wire::{
-    Actuate, Arm, Armed, BoardFault, BoardState, Configured, Message, Sample, StopReason, TELEMETRY_ANSWERED,
-    Telemetry, encode,
+    Actuate, Arm, Armed, BoardFault, BoardState, Configured, Decoder, Message, Sample, StopReason,
+    TELEMETRY_ANSWERED, Telemetry, encode,
 };
 
 /// A shaft of the paper's, a tenth of a period at a time.
@@ -152,7 +152,7 @@ fn the_code_that_a_sample_gives_is_the_laws_answer_to_that_sample() {
     let (mut twin, path, mut out) = (bench.plan.control(), bench.plan.path(), Outbox::default());
     twin.configure(DacCode(BOARD.boot_code), &mut Outbox::default());
     let mut reads = |message: Message| {
-        twin.receive(0, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
+        twin.receive(0, &mut Decoder::new(), encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
         frames(&drain(&mut out))
     };
     reads(Message::Configured(Configured { run: 5, config: CONFIG, boot: BOARD.boot }));

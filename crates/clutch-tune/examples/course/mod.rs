@@ -66,7 +66,7 @@ pub(crate) fn drive(scenario: &Scenario) -> Outcome<Driven> {
         ..VirtualOptions::default()
     };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-    let report = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?.run(&path)?;
+    let report = VirtualLoop::new(scenario, options, ControllerStation::new(node, &path))?.run(&path)?;
     let ended = report.cause.map(|cause| format!("{cause:?}"));
     Ok(Driven { metrics: report.metrics, largest_error: report.largest_error, ended })
 }

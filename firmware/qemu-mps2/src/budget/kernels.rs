@@ -3,7 +3,7 @@
 
 use clutch_core::law::{ControlLaw, Ctc, Law, Pd, Pid, Smc};
 use clutch_core::{Counts, DacCode, Servo, ServoState, Target};
-use clutch_node::{BoardController, Hardware, OneChip, Outboxes};
+use clutch_node::{BoardController, Hardware, Lines, OneChip};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
 use cortex_m::peripheral::SYST;
 
@@ -118,16 +118,16 @@ pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
-    session.outboxes.host.clear();
-    session.outboxes.daq.clear();
-    let Session { node, outboxes, now_ns } = session;
-    node.daq(*now_ns, bytes.as_slice(), &mut outboxes.host, &mut outboxes.daq);
+    session.lines.host.clear();
+    session.lines.daq.clear();
+    let Session { node, lines: Lines { host, daq, from_daq }, now_ns } = session;
+    node.daq(*now_ns, from_daq, bytes.as_slice(), host, daq);
 }
 
 /// A controller and its lines.
 pub struct Session {
     pub node: BoardController,
-    pub outboxes: Outboxes,
+    pub lines: Lines,
     pub now_ns: u64,
 }
 
@@ -146,18 +146,22 @@ pub struct Pins {
     pub line: [u8; 512],
     /// Bytes of the line that are used.
     pub used: usize,
-    /// The timer as the period began, and as its last code was out; it counts downwards.
+    /// The timer as the period began, and as its code was out, not counting the same code once more; it counts downwards.
     pub begun: u32,
     pub out: u32,
+    /// The code that was put out in this period; none yet.
+    pub told: Option<u16>,
 }
 
 /// The converter is written: the end of the path from a sample to its code.
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn converter_written(pins: &mut Pins, code: u16) {
-    // SAFETY: a register that may be read at any time.
-    pins.out = unsafe { (*SYST::PTR).cvr.read() };
-    core::hint::black_box(code);
+    if pins.told != Some(code) {
+        pins.told = Some(code);
+        // SAFETY: a register that may be read at any time.
+        pins.out = unsafe { (*SYST::PTR).cvr.read() };
+    }
 }
 
 impl Hardware for Pins {
@@ -167,6 +171,7 @@ impl Hardware for Pins {
     fn counts(&mut self) -> Counts {
         // SAFETY: as above.
         self.begun = unsafe { (*SYST::PTR).cvr.read() };
+        self.told = None;
         Counts(self.counts)
     }
     fn encoder_fault(&self) -> bool {

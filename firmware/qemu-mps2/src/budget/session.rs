@@ -10,7 +10,7 @@ use clutch_core::{
     Tolerances,
 };
 use clutch_node::{
-    BoardController, BoardControllerParams, BoardParams, ControllerNode, ControllerParams, OneChip, Outboxes,
+    BoardController, BoardControllerParams, BoardParams, ControllerNode, ControllerParams, Lines, OneChip,
     ResetCause,
 };
 use clutch_settings::{RunParams, RunTimes, Settings};
@@ -86,11 +86,10 @@ const CONTROLLER: BoardControllerParams = BoardControllerParams { board: 1, boot
 /// A controller that has been configured by its host, up to the question to encoder and converter.
 fn session(kind: u32) -> Option<Session> {
     let (settings, configure) = run(kind)?;
-    let mut session =
-        Session { node: BoardController::new(CONTROLLER), outboxes: Outboxes::default(), now_ns: 0 };
+    let mut session = Session { node: BoardController::new(CONTROLLER), lines: Lines::default(), now_ns: 0 };
     session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
-    let Outboxes { host, daq } = &mut session.outboxes;
-    session.node.daq(0, encode(&hello(RUN)).as_bytes(), host, daq);
+    let Lines { host, daq, from_daq } = &mut session.lines;
+    session.node.daq(0, from_daq, encode(&hello(RUN)).as_bytes(), host, daq);
     settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
     session.asks(&configure);
     Some(session)
@@ -100,7 +99,7 @@ fn session(kind: u32) -> Option<Session> {
 fn chip(kind: u32) -> Option<Chip> {
     let (settings, configure) = run(kind)?;
     let node = OneChip::new(CONTROLLER, &BOARD).ok()?;
-    let (begun, out) = (0, 0);
+    let (begun, out, told) = (0, 0, None);
     let pins = Pins {
         now_us: 0,
         counts: 0,
@@ -110,6 +109,7 @@ fn chip(kind: u32) -> Option<Chip> {
         used: 0,
         begun,
         out,
+        told,
     };
     let mut chip = Chip { node, pins };
     chip.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
@@ -146,14 +146,16 @@ impl Chip {
 
 /// Runs of a chip: laws, safe states and paths in turn, with faults of its hardware and implausible counts.
 fn measure_chip(random: &mut Random) -> Option<()> {
-    let tally = |code, goes_on, any| [Tally::new(code), Tally::new(goes_on), Tally::new(any)];
-    let mut others = tally("chip_code", "chip_goes_on", "chip_period");
-    let mut table = tally("chip_code_table", "chip_goes_on_table", "chip_period_table");
-    let mut glide = tally("chip_code_glide", "chip_goes_on_glide", "chip_period_glide");
+    let mut others = ["chip_code", "chip_any_code", "chip_goes_on", "chip_period"].map(Tally::new);
+    let mut table =
+        ["chip_code_table", "chip_any_code_table", "chip_goes_on_table", "chip_period_table"].map(Tally::new);
+    let mut glide =
+        ["chip_code_glide", "chip_any_code_glide", "chip_goes_on_glide", "chip_period_glide"].map(Tally::new);
+    let mut safe = Tally::new("chip_safe");
     let laws = LawParams::<f32>::all();
     for kind in 0..RUNS {
         let glides = laws.get(kind as usize % laws.len())?.filter().is_some();
-        let [code, goes_on, any] = match kind % 5 {
+        let [code, any_code, goes_on, any] = match kind % 5 {
             // Bounded apart, and not both at once.
             3 | 4 if glides => continue,
             3 | 4 => &mut table,
@@ -161,42 +163,57 @@ fn measure_chip(random: &mut Random) -> Option<()> {
             _ => &mut others,
         };
         let mut chip = chip(kind)?;
-        // The first sample starts the servo, and is bounded with any period.
-        let (mut began, mut periods) = (false, 0);
+        // The first sample starts the servo, and one behind a refused one bridges: bounded with any sample.
+        let (mut served, mut periods, mut shaft) = (false, 0, 0_i32);
         let rarity = [20, 60, 100_000].get(kind as usize % 3).copied()?;
         for _ in 0..PERIODS {
-            chip.pins.counts = chip.pins.counts.wrapping_add(random.below(3) as i32);
-            match (random.below(rarity), random.below(3)) {
+            shaft = shaft.wrapping_add(random.below(3) as i32);
+            chip.pins.counts = shaft;
+            match (random.below(rarity), random.below(4)) {
                 (0, 0) => chip.pins.encoder_fault = true,
                 (0, 1) => chip.pins.converter_fault = true,
+                // Counts that leap and stay, or are wrong once.
+                (0, 2) => (shaft, chip.pins.counts) = (random.next() as i32, shaft),
                 (0, _) => chip.pins.counts = random.next() as i32,
                 _ => {}
             }
+            let drove = chip.node.state() == BoardState::Running;
             let (period, to_code) = chip.period();
+            let (goes, answered) = (chip.node.state() == BoardState::Running, chip.answered());
             any.add(period);
-            if began && chip.node.state() == BoardState::Running && periods + 8 < PERIODS {
+            if served && goes && periods + 8 < PERIODS {
                 goes_on.add(period);
-                if chip.answered() {
+                if answered {
                     code.add(to_code);
                 }
             }
-            began = chip.node.state() == BoardState::Running;
+            if answered {
+                any_code.add(to_code);
+            }
+            if drove
+                && chip.node.state() == BoardState::Faulted
+                && !chip.pins.encoder_fault
+                && !chip.pins.converter_fault
+            {
+                safe.add(to_code);
+            }
+            served = goes && answered;
             periods += 1;
             if random.below(500) == 0 {
                 chip.asks(&Message::Stop(Stop { run: RUN, reason: StopReason::Operator as u8 }));
             }
         }
     }
-    [others, table, glide].iter().flatten().for_each(Tally::print);
+    [others, table, glide].iter().flatten().chain([&safe]).for_each(Tally::print);
     Some(())
 }
 
 impl Session {
     /// A frame of the host's, which is not measured.
     fn asks(&mut self, message: &Message) {
-        self.outboxes.host.clear();
-        self.outboxes.daq.clear();
-        let Outboxes { host, daq } = &mut self.outboxes;
+        self.lines.host.clear();
+        self.lines.daq.clear();
+        let Lines { host, daq, .. } = &mut self.lines;
         self.node.host(self.now_ns, encode(message).as_bytes(), host, daq);
     }
 

@@ -17,7 +17,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    HostNode, Notice, Outbox, Outboxes, ResetCause,
+    HostNode, Lines, Notice, Outbox, ResetCause,
 };
 use clutch_settings::{RunParams, RunTimes, Setting, Settings};
 use clutch_wire::{Decoder, Message, encode};
@@ -195,12 +195,15 @@ pub struct Desk {
     pub host: HostNode,
     pub board_controller: BoardController,
     pub board: BoardNode,
+    /// Reads the frames of who speaks to the board, and of the board for the twin.
+    pub line: Decoder,
     pub twin: ControllerNode<f32>,
+    twin_line: Decoder,
     pub now_ns: u64,
     /// Time by which the host's clock is ahead of the board's, ns.
     pub host_later_ns: u64,
     pub to_board: Outbox,
-    pub outboxes: Outboxes,
+    pub lines: Lines,
     pub up: Outbox,
     /// True if the host looks at the clock.
     pub host_alive: bool,
@@ -222,11 +225,13 @@ impl Desk {
             host: plan.host(),
             board_controller: BoardController::new(BOARD_CONTROLLER),
             board: BoardNode::new(&BOARD).unwrap(),
+            line: Decoder::new(),
             twin: plan.control(),
+            twin_line: Decoder::new(),
             now_ns: 1000 * MS,
             host_later_ns: 0,
             to_board: Outbox::default(),
-            outboxes: Outboxes::default(),
+            lines: Lines::default(),
             up: Outbox::default(),
             host_alive: true,
             sent: Vec::new(),
@@ -250,24 +255,21 @@ impl Desk {
         for _ in 0..10 {
             let up = drain(&mut self.up);
             let down = drain(&mut self.to_board);
-            if up.is_empty()
-                && down.is_empty()
-                && self.outboxes.daq.is_empty()
-                && self.outboxes.host.is_empty()
-            {
+            if up.is_empty() && down.is_empty() && self.lines.daq.is_empty() && self.lines.host.is_empty() {
                 return heard;
             }
-            let Outboxes { host, daq } = &mut self.outboxes;
+            let Lines { host, daq, from_daq } = &mut self.lines;
             self.board_controller.host(self.now_ns, &down, host, daq);
             if !up.is_empty() {
-                let Outboxes { host, daq } = &mut self.outboxes;
-                self.board_controller.daq(self.now_ns, &up, host, daq);
-                let (path, expected) = (self.plan.path(), &mut self.expected);
-                self.twin.receive(self.now_ns, &up, &path, &mut Outbox::default(), &mut |n| expected.push(n));
+                self.board_controller.daq(self.now_ns, from_daq, &up, host, daq);
+                let (path, line, expected) = (self.plan.path(), &mut self.twin_line, &mut self.expected);
+                let mut out = Outbox::default();
+                self.twin.receive(self.now_ns, line, &up, &path, &mut out, &mut |n| expected.push(n));
             }
-            let daq = drain(&mut self.outboxes.daq);
-            self.board.receive(self.now_us(), &daq, &mut self.up);
-            let host = drain(&mut self.outboxes.host);
+            let daq = drain(&mut self.lines.daq);
+            let now_us = self.now_us();
+            self.board.receive(now_us, &mut self.line, &daq, &mut self.up);
+            let host = drain(&mut self.lines.host);
             heard.extend(frames(&host));
             self.sent.extend_from_slice(&host);
             let notices = &mut self.notices;
@@ -347,7 +349,7 @@ impl Desk {
 
     /// Both ends look at the clock.
     pub fn polls(&mut self) -> Vec<Message> {
-        let Outboxes { host, daq } = &mut self.outboxes;
+        let Lines { host, daq, .. } = &mut self.lines;
         self.board_controller.poll(self.now_ns, host, daq);
         if self.host_alive {
             let notices = &mut self.notices;
