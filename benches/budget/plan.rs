@@ -70,6 +70,7 @@ struct Flashed {
     name: String,
     image: String,
     symbol: String,
+    #[serde(default)]
     measured: String,
     #[serde(default)]
     until: Vec<String>,
@@ -119,10 +120,20 @@ pub(crate) struct Memory {
     /// The function of a period, in an image that is flashed.
     #[serde(default = "with_host")]
     pub(crate) period: String,
+    /// The stack, in an image that is flashed, of what makes its run while nothing is driven.
+    #[serde(default)]
+    pub(crate) setup_stack: u64,
+    /// That function: of bytes of the host, a configuration among them.
+    #[serde(default = "by_host")]
+    pub(crate) setup: String,
 }
 
 fn with_host() -> String {
     "clutch_node::board_program::tick".to_owned()
+}
+
+fn by_host() -> String {
+    "clutch_node::board_program::receive".to_owned()
 }
 
 impl Plan {

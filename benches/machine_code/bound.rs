@@ -123,15 +123,21 @@ impl<'a> Bounds<'a> {
     }
 
     /// The bound from the first instruction of a function to any call of another, in it or in what it calls: also
-    /// to the last of several. The code after that, and the other function itself, cost nothing.
+    /// to the last of several. The code after that, and the other function itself, cost nothing. A generic function that the image
+    /// has several times is each of them.
     ///
     /// # Errors
     /// Everything that prevents a bound; the second function is not called.
     pub fn until(&mut self, name: &str, until: &str) -> Result<Cost, Vec<Fault>> {
-        let of = |name| self.image.function(name).map_err(|f| vec![f]);
-        let (function, end) = (of(name)?, of(until)?);
-        let cost = self.up_to(function, end.address, &mut BTreeMap::new());
-        match cost {
+        let image = self.image;
+        let all = |name: &str| {
+            let found: Vec<&Function> = image.functions().filter(|f| f.name == name).collect();
+            if found.is_empty() { Err(vec![Fault::NoFunction(name.to_owned())]) } else { Ok(found) }
+        };
+        let ends: BTreeSet<u32> = all(until)?.iter().map(|f| f.address).collect();
+        let mut known = BTreeMap::new();
+        let reached = all(name)?.into_iter().filter_map(|function| self.up_to(function, &ends, &mut known));
+        match reached.reduce(Cost::max) {
             _ if !self.found.is_empty() => Err(std::mem::take(&mut self.found)),
             Some(cost) => Ok(cost),
             None => Err(vec![Fault::NoReturn { function: format!("{name}, up to {until}") }]),
@@ -142,10 +148,10 @@ impl<'a> Bounds<'a> {
     fn up_to(
         &mut self,
         function: &Function,
-        end: u32,
+        ends: &BTreeSet<u32>,
         known: &mut BTreeMap<u32, Option<Cost>>,
     ) -> Option<Cost> {
-        if function.address == end {
+        if ends.contains(&function.address) {
             return Some(Cost::default());
         }
         if let Some(cost) = known.get(&function.address) {
@@ -156,7 +162,7 @@ impl<'a> Bounds<'a> {
             return None;
         }
         self.within.push(function.address);
-        let cost = self.up_to_calls(function, end, known);
+        let cost = self.up_to_calls(function, ends, known);
         self.within.pop();
         known.insert(function.address, cost);
         cost
@@ -165,7 +171,7 @@ impl<'a> Bounds<'a> {
     fn up_to_calls(
         &mut self,
         function: &Function,
-        end: u32,
+        ends: &BTreeSet<u32>,
         known: &mut BTreeMap<u32, Option<Cost>>,
     ) -> Option<Cost> {
         let mut graph = match Graph::new(self.image, function) {
@@ -176,7 +182,7 @@ impl<'a> Bounds<'a> {
             }
         };
         // For each block, the place of the last call from which the end is reached, and the cost from there on.
-        let mut ends: BTreeMap<usize, (usize, Cost)> = BTreeMap::new();
+        let mut last: BTreeMap<usize, (usize, Cost)> = BTreeMap::new();
         for (n, block) in graph.blocks.iter().enumerate() {
             for (k, i) in block.instructions.iter().enumerate() {
                 let target = match i.flow {
@@ -189,23 +195,23 @@ impl<'a> Bounds<'a> {
                 if self.never(function, callee) {
                     break;
                 }
-                if let Some(rest) = self.up_to(callee, end, known) {
-                    ends.insert(n, (k, rest + Cost::cycles(refill(i))));
+                if let Some(rest) = self.up_to(callee, ends, known) {
+                    last.insert(n, (k, rest + Cost::cycles(refill(i))));
                 }
             }
         }
         // Only the blocks from which the end is still to come; of those that are its last, only what is before.
-        let reaches = graph.reaching(&ends.keys().copied().collect());
+        let reaches = graph.reaching(&last.keys().copied().collect());
         for (n, block) in graph.blocks.iter_mut().enumerate() {
             block.returns = false;
             block.tail_call = None;
             block.next.retain(|to| reaches.contains(to));
-            match ends.get(&n) {
+            match last.get(&n) {
                 Some((k, _)) if block.next.is_empty() => block.instructions.truncate(k + 1),
                 _ => {}
             }
         }
-        if ends.is_empty() { None } else { self.longest_to(function, &graph, &ends) }
+        if last.is_empty() { None } else { self.longest_to(function, &graph, &last) }
     }
 
     fn longest_to(

@@ -5,23 +5,30 @@
 // The module `alone_run`, written by `clutch scenario rust`: the file that build.rs chose.
 include!(concat!(env!("OUT_DIR"), "/alone_run.rs"));
 
-use clutch_node::Hardware as _;
+use clutch_node::{BoardParams, Hardware as _};
 use clutch_nucleo_g474re::board::{self, Board, Line, READ_BACK};
 use clutch_nucleo_g474re::{button, run};
 use static_cell::StaticCell;
 
 #[embassy_executor::task]
 async fn control(mut board: Board<READ_BACK>, _line: Line) -> ! {
-    static ALONE: StaticCell<alone_run::OfRun> = StaticCell::new();
     button::start();
-    let Ok(alone) = alone_run::controller(&board.params()) else { refuse(&mut board).await };
-    let alone = ALONE.init_with(|| alone);
+    let Some(alone) = made(&board.params()) else { refuse(&mut board).await };
     let mut beat = run::every(alone.period_us());
     loop {
         beat.next().await;
         alone.tick(&mut board, button::pressed());
         button::light(alone.lamp());
     }
+}
+
+/// The controller of the run, in a memory cell; none if it is of another board.
+// A function of its own in machine code: what it takes of the stack would be the task's in each period.
+#[inline(never)]
+fn made(board: &BoardParams) -> Option<&'static mut alone_run::OfRun> {
+    static ALONE: StaticCell<alone_run::OfRun> = StaticCell::new();
+    let alone = alone_run::controller(board).ok()?;
+    Some(ALONE.init_with(|| alone))
 }
 
 /// A run that this board cannot take: the output stays the boot code, and the lamp flickers.

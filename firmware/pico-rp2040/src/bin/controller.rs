@@ -2,8 +2,8 @@
 #![no_std]
 #![no_main]
 
-use clutch_node::{BoardControllerParams, OneChip, ResetCause};
-use clutch_pico_rp2040::board::{CYCLES_HZ, start, stop};
+use clutch_node::{BoardControllerParams, OneChip};
+use clutch_pico_rp2040::board::{CYCLES_HZ, start};
 use clutch_pico_rp2040::run;
 use cortex_m_rt::entry;
 
@@ -12,6 +12,6 @@ fn main() -> ! {
     let board = start();
     let params = board.params();
     let controller = BoardControllerParams { board: params.board, boot: params.boot, clock_hz: CYCLES_HZ };
-    let Ok(mut role) = OneChip::new(controller, &params) else { stop(ResetCause::Fault) };
-    run::run(&mut role, board)
+    // Its parameters were checked when they were compiled.
+    run::run(&mut OneChip::of(controller, &params), board)
 }
