@@ -442,7 +442,7 @@ fn smooth() -> Result<()> {
     for table in ["identified", "maps"] {
         write_between("docs/smooth.md", table, &table_in("clutch-identify", table, &[])?)?;
     }
-    Ok(())
+    write_between("docs/smooth.md", "motor_maps", &table_in("clutch-identify", "maps", &["motor"])?)
 }
 
 fn drift() -> Result<()> {
