@@ -43,6 +43,25 @@ fn the_truth_lies_between_the_bounds_on_every_disc() {
     assert!(all > 3_000.0 && sure > 1_000.0, "{sure} sure of {all}");
 }
 
+/// Of micro-steps a count holds several: counts show that the shaft has stuck, and no more.
+#[test]
+fn micro_steps_are_a_lower_bound_and_no_number() {
+    let micro = |below: f64| ("law.glide.micro_below_deg_s", Value::Float(below));
+    for (rate, counts) in [(0.1, 20_000), (0.5, 20_000), (0.5, 200_000)] {
+        let encoder = ("rig.encoder.counts_per_rev", Value::Integer(counts));
+        let run = run("bench_glide_2", rate, 3, &[micro(0.95), encoder]);
+        let Verdict::AtLeast(least) = run.detected.verdict() else {
+            panic!("{rate} °/s, {counts}: {:?}", run.detected)
+        };
+        let truth = run.metrics.stick_slip_cycles_per_s;
+        assert!(least > 1.0 && truth > 1.1 * least, "{rate} °/s, {counts}: {truth} of at least {least}");
+        assert_eq!(run.detected.most_cycles_per_s, None);
+        assert!(run.detected.reason().unwrap().contains("micro-steps"), "{:?}", run.detected.reason());
+    }
+    // Above the rate below which there are any it slides, and a number is told.
+    assert_eq!(run("bench_glide_2", 2.0, 3, &[micro(0.95)]).detected.verdict(), Verdict::Told(0.0));
+}
+
 /// A motor turns a shaft round within a count, to and fro, and it never sticks: no voltage says that it surely did.
 #[test]
 fn a_motor_that_turns_a_shaft_round_within_a_count_is_no_sure_stick() {

@@ -456,7 +456,7 @@ fn meter() -> Result<()> {
     for counts in ["2000", "20000", "200000"] {
         write_between("docs/meter.md", &format!("laws {counts}"), &table_of("meter", &["laws", counts])?)?;
     }
-    for table in ["rates", "rigs"] {
+    for table in ["rates", "sources", "edges", "rigs"] {
         write_between("docs/meter.md", table, &table_of("meter", &[table])?)?;
     }
     Ok(())

@@ -1,10 +1,11 @@
 //! The meter of stick-slip against the simulator's events: the tables of docs/meter.md, by `cargo xtask meter`.
 //!
 //! ```sh
-//! cargo run --release --package clutch-sim --example meter -- laws 20000    # or rates, rigs
+//! cargo run --release --package clutch-sim --example meter -- laws 20000    # or rates, sources, edges, rigs
 //! ```
 
-use clutch_core::{Counts, Encoder, Plant};
+use clutch_core::edge_timed::{EdgeTimed, EdgeTimedParams, waves_seen};
+use clutch_core::{Counts, Encoder, FixedCounts, Plant};
 use clutch_sim::detected::Verdict;
 use clutch_sim::engine::EventKind;
 use clutch_sim::meter::Meter;
@@ -27,6 +28,16 @@ const HELD_OUT: std::ops::Range<i64> = 3001..3011;
 /// Length of a run and its settling time, s.
 const LENGTH: (f64, f64) = (9.0, 1.0);
 
+/// PI with feed-forward, and the source of its velocity.
+macro_rules! pi {
+    ($velocity:literal) => {
+        concat!(
+            "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n",
+            $velocity
+        )
+    };
+}
+
 /// Laws that follow a path, by their names for readers, and their part of a scenario.
 const LAWS: &[(&str, &str)] = &[
     ("PD", "[law.pd]"),
@@ -45,18 +56,25 @@ const LAWS: &[(&str, &str)] = &[
         "DOB",
         "[law.dob]\nkp_1_s2 = 6700.0\nkd_1_s = 150.0\nbandwidth_rad_s = 120.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.41",
     ),
-    (
-        "PI with feed-forward",
-        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67",
-    ),
-    (
-        "PI, edge-timed",
-        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.edge_timed]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES",
-    ),
+    ("PI with feed-forward", pi!("[velocity.smoothed_derivative]\nsmoothing = 0.67")),
+    ("PI, edge-timed", pi!("[velocity.edge_timed]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES")),
     ("glide", "[law.glide.filter]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES"),
     (
         "glide in a shell",
         "[law.glide.filter]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES\n\n[shell]\nslope_1_s = 50.0\nboundary_rad_s = 0.1",
+    ),
+];
+
+/// Other sources of the velocity, and micro-steps: rows of their own.
+const SOURCES: &[(&str, &str)] = &[
+    ("PI, M/T", pi!("[velocity.counts_over_time]")),
+    ("PI, observer", pi!("[velocity.observer]")),
+    ("SMC, M/T", "[law.smc]\n\n[velocity.counts_over_time]"),
+    ("SMC, observer", "[law.smc]\n\n[velocity.observer]"),
+    ("SMC, edge-timed", "[law.smc]\n\n[velocity.edge_timed]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES"),
+    (
+        "glide, steps below 0.95 °/s",
+        "[law.glide]\nmicro_below_deg_s = 0.95\n\n[law.glide.filter]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES",
     ),
 ];
 
@@ -108,7 +126,20 @@ struct Score {
     /// From a stick's beginning to the call, and to the edge at which it is sure, s.
     to_call: Vec<f64>,
     to_edge: Vec<f64>,
+    /// Calls of the edge-timed velocity, for each of [`SLOW`].
+    slow: [Slow; SLOW.len()],
 }
+
+/// Gaps that the edge-timed velocity calls, those of them with a stick, and the times from its beginning, s.
+#[derive(Clone, Default)]
+struct Slow {
+    calls: usize,
+    right: usize,
+    to_call: Vec<f64>,
+}
+
+/// Velocities at which it calls a stick, as shares of the path's.
+const SLOW: [f64; 3] = [0.0, 0.1, 0.3];
 
 impl Score {
     fn add(&mut self, o: Score) {
@@ -125,6 +156,11 @@ impl Score {
         self.told_right += o.told_right;
         self.to_call.extend(o.to_call);
         self.to_edge.extend(o.to_edge);
+        for (own, other) in self.slow.iter_mut().zip(o.slow) {
+            own.calls += other.calls;
+            own.right += other.right;
+            own.to_call.extend(other.to_call);
+        }
     }
 
     fn of(scenario: &Scenario, run: &Run) -> Outcome<Score> {
@@ -140,6 +176,7 @@ impl Score {
             .filter(|e| e.kind == EventKind::Stick)
             .map(|e| (e.time, (e.position * per_radian).floor() as i32))
             .collect();
+        let shares = shares(scenario, run)?;
         let mut score = Score { runs: 1, ..Score::default() };
         for (k, (counts, volts)) in run.trace.counts.iter().zip(&run.trace.voltage).enumerate() {
             let Some(gap) = meter.sample(k as u64, Counts(*counts), *volts) else { continue };
@@ -163,6 +200,14 @@ impl Score {
             score.possible_right += one(gap.possible && !within.is_empty());
             score.calls += one(call.is_some());
             score.calls_right += one(call.is_some() && !within.is_empty());
+            for (slow, below) in score.slow.iter_mut().zip(SLOW) {
+                let call = (gap.begin..gap.end).find(|k| shares[*k as usize] <= below);
+                slow.calls += one(call.is_some());
+                slow.right += one(call.is_some() && !within.is_empty());
+                // A call before the stick is one at once.
+                let late = within.first().zip(call).map(|(first, k)| k as f64 * period - first);
+                slow.to_call.extend(late.map(|late| late.max(0.0)));
+            }
             if let Some(first) = within.first() {
                 score.to_call.extend(call.map(|k| *k as f64 * period - first));
                 score.to_edge.extend(gap.sure.then_some(end - first));
@@ -178,6 +223,28 @@ impl Score {
         }
         Ok(score)
     }
+}
+
+/// The edge-timed velocity of each sample of a run, as a share of the path's, by a filter that believes what the meter does.
+fn shares(scenario: &Scenario, run: &Run) -> Outcome<Vec<f64>> {
+    let spec = scenario.spec();
+    let counts_per_rev = spec.rig.encoder.sensor.counts_per_rev;
+    let encoder = Encoder::new::<f64>(counts_per_rev)?;
+    let defaults = EdgeTimedParams::<f64>::default();
+    let params = EdgeTimedParams { delay: 1, waves: waves_seen(defaults.waves, counts_per_rev), ..defaults };
+    let filter = EdgeTimed::new(&params, &Plant::new(&spec.model)?, encoder, spec.period)?;
+    let (counts, volts) = (&run.trace.counts, &run.trace.voltage);
+    let rate = run.trace.target_velocity.first().copied().unwrap_or(0.0);
+    let at = |k: usize| FixedCounts::from_counts(counts[k].into());
+    let mut state = filter.start(at(0), run.trace.start_voltage, rate);
+    let pace = filter.per_period(rate);
+    let share = |k: usize| {
+        if k > 0 {
+            filter.update(&mut state, at(k), volts[k - 1], rate);
+        }
+        state.velocity() / pace
+    };
+    Ok((0..counts.len()).map(share).collect())
 }
 
 /// The scenario of a law on `bench`; the filter's waves have to be resolved by the encoder.
@@ -244,7 +311,7 @@ fn laws(counts: i64) -> Outcome<()> {
     let rates: Vec<String> = RATES.iter().map(|rate| format!("{rate} °/s")).collect();
     println!("| law | {} |", rates.join(" | "));
     println!("|---|{}", "---|".repeat(RATES.len()));
-    for (title, law) in LAWS {
+    for (title, law) in LAWS.iter().chain(SOURCES) {
         let mut cells = Vec::new();
         for rate in RATES {
             let s = score(law, counts, rate, &[], MADE_ON)?;
@@ -295,6 +362,60 @@ fn print_row(title: &str, mut s: Score) {
     );
 }
 
+/// Other sources of the velocity and micro-steps, by encoder, over all rates.
+fn sources() -> Outcome<()> {
+    println!(
+        "| counts | law | sticks | silence: precision | recall | ms | sure: precision | recall | ms | possible: precision | recall | runs told | told right |"
+    );
+    println!("|---|{}", "---|".repeat(12));
+    for counts in ENCODERS {
+        for (title, law) in SOURCES {
+            let mut s = Score::default();
+            for rate in RATES {
+                s.add(score(law, counts, rate, &[], HELD_OUT)?);
+            }
+            print_row(&format!("{counts} | {title}"), s);
+        }
+    }
+    Ok(())
+}
+
+/// The edge-timed velocity as a detector, beside silence and what is sure.
+fn edges() -> Outcome<()> {
+    let below = SLOW.map(|share| match share {
+        0.0 => " at rest: precision | recall | ms |".to_owned(),
+        share => format!(" below {share} of the path's: precision | recall | ms |"),
+    });
+    println!(
+        "| counts | °/s | gaps with a stick | silence: precision | recall | ms | sure: recall | ms |{}",
+        below.concat()
+    );
+    println!("|{}", "---|".repeat(8 + 3 * SLOW.len()));
+    for counts in ENCODERS {
+        for rate in RATES_ON_RIGS {
+            let mut s = Score::default();
+            for (_, law) in LAWS.iter().filter(|(name, _)| ON_RIGS.contains(name)) {
+                s.add(score(law, counts, rate, &[], HELD_OUT)?);
+            }
+            let stuck = s.stuck_gaps;
+            let slow = s.slow.iter_mut().map(|slow| {
+                let (precision, recall) = (share(slow.right, slow.calls), share(slow.right, stuck));
+                format!(" {precision} | {recall} | {} |", times(&mut slow.to_call))
+            });
+            let slow: String = slow.collect();
+            println!(
+                "| {counts} | {rate} | {stuck} | {} | {} | {} | {} | {} |{slow}",
+                share(s.calls_right, s.calls),
+                share(s.calls_right, stuck),
+                times(&mut s.to_call),
+                share(s.sure_right, stuck),
+                times(&mut s.to_edge),
+            );
+        }
+    }
+    Ok(())
+}
+
 /// The same with rigs that are not as believed.
 fn rigs() -> Outcome<()> {
     println!("| the rig | sticks | sure: precision | recall | possible: precision | recall | told right |");
@@ -324,7 +445,9 @@ fn main() -> Outcome<()> {
     match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["laws", counts] => laws(counts.parse()?),
         ["rates"] => rates(),
+        ["sources"] => sources(),
+        ["edges"] => edges(),
         ["rigs"] => rigs(),
-        _ => Err("expected laws and an encoder, rates, or rigs".into()),
+        _ => Err("expected laws and an encoder, rates, sources, edges, or rigs".into()),
     }
 }

@@ -4,6 +4,7 @@ use crate::meter::{Gap, Meter, Tally};
 use crate::metrics::Detected;
 use crate::number;
 use crate::run_spec::{Keep, RunSpec};
+use clutch_core::law::LawParams;
 use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams, StickSlipState};
 
 /// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.
@@ -52,6 +53,12 @@ impl Detected {
     pub fn reason(&self) -> Option<String> {
         self.told_cycles_per_s.is_none().then(|| {
             let [least, most] = self.bounds();
+            if self.least_cycles_per_s.is_some() && self.most_cycles_per_s.is_none() {
+                return format!(
+                    "the law went in micro-steps, of which a count holds several: the shaft has stuck in {} counts/s",
+                    number(least)
+                );
+            }
             format!(
                 "counts and voltage leave {} to {} cycles/s, sticks within one count as one: gaps between two edges last long enough for a stick \
                  unseen, and the voltage falls far enough in them; a finer encoder, or another rate, shows more",
@@ -93,6 +100,10 @@ pub struct Detector {
     before: (u64, u64, u64),
     /// Periods before it of a silence that is not yet found to be a stick.
     unheard: u64,
+    /// Velocity of the path below which the law goes in micro-steps, rad/s, and if it has since settling: a count holds
+    /// several sticks then.
+    steps_below: f64,
+    stepped: bool,
 }
 
 impl Detector {
@@ -123,6 +134,8 @@ impl Detector {
             from: libm::ceil(settle / period - 1e-9) as u64,
             before: (0, 0, 0),
             unheard: 0,
+            steps_below: if let LawParams::Glide(law) = &spec.law { law.micro } else { 0.0 },
+            stepped: false,
         })
     }
 
@@ -139,7 +152,11 @@ impl Detector {
         if (tick as f64) * self.period < self.settle {
             self.before = (self.silent.cycles(), self.silent.stuck_ticks(), self.climbing.cycles());
             self.unheard = if self.silent.stuck() { 0 } else { silent };
-        } else if begins {
+            return Noticed { begins, gap };
+        }
+        let fast = path_velocity.abs();
+        self.stepped |= fast > 0.0 && fast < self.steps_below;
+        if begins {
             // The silence before settling has been added with the rest.
             self.before.1 += std::mem::take(&mut self.unheard);
         } else if silent == 0 {
@@ -157,14 +174,16 @@ impl Detector {
         // A shaft that stands at the end may have stuck, and no edge has judged it.
         let unended = u64::from(self.silent.stuck());
         let (least, most) = (per_s(self.tally.least), per_s(self.tally.most + unended));
-        let told = self.meter.is_some() && most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
+        let told = self.meter.is_some()
+            && !self.stepped
+            && most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
         let of_meter = |bound: f64| self.meter.is_some().then_some(bound);
         Detected {
             stick_slip_cycles_per_s: seen,
             stick_time_fraction: (self.silent.stuck_ticks() - self.before.1) as f64 * self.period / time,
             stairs_per_s: per_s(self.climbing.cycles() - self.before.2),
             least_cycles_per_s: of_meter(least),
-            most_cycles_per_s: of_meter(most),
+            most_cycles_per_s: of_meter(most).filter(|_| !self.stepped),
             told_cycles_per_s: told.then(|| seen.max(least).min(most)),
         }
     }
