@@ -11,6 +11,7 @@ const GAIN: f64 = 0.05;
 /// An axis, as nobody knows it; torques in volts.
 pub(crate) struct Truth {
     pub(crate) scenario: Scenario,
+    /// Dead time and lag together, s.
     pub(crate) delay: f64,
     pub(crate) at_rest: f64,
     pub(crate) sliding: f64,
@@ -54,8 +55,9 @@ pub(crate) fn truth_with(seed: u64, set: &Set) -> Outcome<Truth> {
         sliding / 0.25,
     );
     let scenario = Scenario::parse("axis", &text, set)?;
+    let lag = scenario.params().rig.actuator_time_constant.unwrap_or(0.0);
     Ok(Truth {
-        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>(),
+        delay: f64::from(delay) * scenario.spec().period.seconds::<f64>() + lag,
         scenario,
         at_rest: ratio * sliding / GAIN,
         sliding: sliding / GAIN,
