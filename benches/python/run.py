@@ -91,14 +91,17 @@ def many_runs(job: str, quick: bool) -> list[Row]:
     mine = Candidate("clutch.sweep", lambda: ours.run_many(scenario, pairs), rounds)
     turns = [("", [(numba, targets["numba"])], mine)]
     for i, (name, ours_name, march) in enumerate(c_peer.instructions()):
-        c_peer.build(march)
-        brute = functools.partial(c_peer.run_many, job, n, march)
-        peer = (Candidate(f"C in vectors, RK4, 10 steps a sample, {name}", brute, rounds), targets["c"])
+        peers = []
+        for kind, method in c_peer.NAMES.items():
+            c_peer.build(kind, march)
+            work = functools.partial(c_peer.run_many, kind, job, n, march)
+            target = targets["c"] if kind == "brute" else None
+            peers.append((Candidate(f"C in vectors, {method}, {name}", work, rounds), target))
         if i == 0:  # the widest, which clutch takes by itself
-            turns[0][1].append(peer)
+            turns[0][1].extend(peers)
         else:
             narrow = functools.partial(ours.run_in, ours_name, scenario, pairs)
-            turns.append((f", {name} only", [peer], Candidate("clutch.sweep", narrow, rounds)))
+            turns.append((f", {name} only", peers, Candidate("clutch.sweep", narrow, rounds)))
     rows = []
     for only, peers, our in turns:
         interleave([*(c for c, _ in peers), our])
