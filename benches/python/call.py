@@ -14,15 +14,15 @@ from timing import Candidate
 CALLS = 20_000
 
 
-def build_floor() -> ModuleType:
-    """Compiles floor/floor.c with the C compiler of the system and imports it."""
-    source = pathlib.Path(__file__).parent / "floor/floor.c"
+def build(name: str) -> ModuleType:
+    """Compiles a floor of the folder `floor` with the C compiler of the system and imports it."""
+    source = pathlib.Path(__file__).parent / "floor" / f"{name}.c"
     with tempfile.TemporaryDirectory() as folder:
-        library = pathlib.Path(folder) / ("floor" + sysconfig.get_config_var("EXT_SUFFIX"))
+        library = pathlib.Path(folder) / (name + sysconfig.get_config_var("EXT_SUFFIX"))
         include = sysconfig.get_paths()["include"]
         command = ["cc", "-O3", "-Wall", "-Werror", "-shared", "-fPIC", f"-I{include}", str(source)]
         subprocess.run([*command, "-o", str(library)], check=True)
-        spec = importlib.util.spec_from_file_location("floor", library)
+        spec = importlib.util.spec_from_file_location(name, library)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
@@ -30,7 +30,7 @@ def build_floor() -> ModuleType:
 
 def candidates(rounds: int) -> list[Candidate]:
     """Ours, the floors, and the loop around them, which is subtracted."""
-    floor = build_floor()
+    floor, stable = build("floor"), build("stable")
     per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
     ticks = range(CALLS)
     # The shaft a few counts ahead of the path, as on a ramp; and the numbers a caller would have at hand.
@@ -41,27 +41,23 @@ def candidates(rounds: int) -> list[Candidate]:
     our_targets = [clutch.Target(p, RATES["J2"], 0.0) for p in positions]
     ours.start(0, our_targets[0], 0.0)
     numbers = (KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
-    law, servo = floor.Law(*numbers), floor.Servo(*numbers)
-    floor_targets = [floor.Target(p, RATES["J2"], 0.0) for p in positions]
+    law, servo, checked = floor.Law(*numbers), floor.Servo(*numbers), stable.Servo(*numbers)
+    floor_targets, stable_targets = ([of.Target(p, RATES["J2"], 0.0) for p in positions] for of in (floor, stable))
+    floors = ((law, floor_targets), (servo, floor_targets), (checked, stable_targets))
 
     # Before anything is timed: all are the same law. Ours and the servo take targets in whole 2^-16 counts, up to 24 µV
     # of the proportional term and 120 µV of the derivative's.
     ours_volts = [ours.step(c, t) for c, t in zip(counts, our_targets, strict=True)]
-    for least in (law, servo):
-        floor_volts = [least.step(c, t) for c, t in zip(counts, floor_targets, strict=True)]
+    for least, targets in floors:
+        floor_volts = [least.step(c, t) for c, t in zip(counts, targets, strict=True)]
         worst = max(abs(a - b) for a, b in zip(ours_volts, floor_volts, strict=True))
         assert worst < 1e-3, f"ours and the {type(least).__name__} in C differ by {worst} V"
     assert max(ours_volts) - min(ours_volts) > 1.0, "the law is at its limits all the time"
 
-    def loop_ours():
-        step = ours.step
-        for c, t in zip(counts, our_targets, strict=True):
-            step(c, t)
-
-    def loop_of(least):
+    def loop_of(servo, targets):
         def loop():
-            step = least.step
-            for c, t in zip(counts, floor_targets, strict=True):
+            step = servo.step
+            for c, t in zip(counts, targets, strict=True):
                 step(c, t)
 
         return loop
@@ -71,9 +67,10 @@ def candidates(rounds: int) -> list[Candidate]:
             pass
 
     works = {
-        "clutch.Servo.step": loop_ours,
-        "C-API floor, the law": loop_of(law),
-        "C-API floor, the servo": loop_of(servo),
+        "clutch.Servo.step": loop_of(ours, our_targets),
+        "C-API floor, the law": loop_of(*floors[0]),
+        "C-API floor, the servo": loop_of(*floors[1]),
+        "stable ABI floor, the servo with our checks": loop_of(*floors[2]),
         "empty loop": loop_empty,
     }
     return [Candidate(name, work, rounds) for name, work in works.items()]

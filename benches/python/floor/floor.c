@@ -1,13 +1,13 @@
 /* The floor of a law's step called from Python: the least cost of CPython's own C API for the same arguments.
  *
  * C types with a METH_FASTCALL method: a whole number of counts and a target in, a float out. `Law` is PD (4) with (5)
- * and its limits alone. `Servo` does all that a servo has to: positions of 64 bits in 2^-16 counts across the wrap of
- * the counter, the offset of a bumpless start, a voltage for what is no number, the converter's code, and what is asked
- * of it afterwards. No checks beyond those without which it would crash. */
+ * and its limits alone, `Servo` all of servo.h. No checks beyond those without which it would crash. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <structmember.h>
+
+#include "servo.h"
 
 typedef struct {
     PyObject_HEAD
@@ -95,33 +95,17 @@ static PyTypeObject LawType = {
 
 typedef struct {
     PyObject_HEAD
-    double kp, kd, keep, scale, radians_per_count, lowest, highest, decay;
-    double dac_lowest, dac_step, per_volt, top;
-    int32_t counts;
-    int64_t position, error;
-    double rate, offset, applied;
-    /* Of the last step. */
-    double tick_error, tick_rate, demand, terms[2];
-    int limit;
-    uint16_t code;
+    servo servo;
 } Servo;
 
 static int Servo_init(Servo *self, PyObject *args, PyObject *kwargs)
 {
     static char *names[] = {"kp", "kd", "smoothing", "period", "radians_per_count", "lowest", "highest", NULL};
-    double smoothing, period;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "ddddddd", names, &self->kp, &self->kd, &smoothing, &period,
-                                     &self->radians_per_count, &self->lowest, &self->highest))
+    double kp, kd, smoothing, period, radians_per_count, lowest, highest;
+    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "ddddddd", names, &kp, &kd, &smoothing, &period, &radians_per_count,
+                                     &lowest, &highest))
         return -1;
-    self->keep = 1.0 - smoothing;
-    self->scale = smoothing * self->radians_per_count / period;
-    self->dac_lowest = -10.0;
-    self->dac_step = 20.0 / 4096.0;
-    self->per_volt = 4096.0 / 20.0;
-    self->top = 4095.0;
-    self->counts = 0;
-    self->position = self->error = 0;
-    self->rate = self->offset = self->decay = self->applied = 0.0;
+    self->servo = servo_of(kp, kd, smoothing, period, radians_per_count, lowest, highest);
     return 0;
 }
 
@@ -129,37 +113,7 @@ static PyObject *Servo_step(Servo *self, PyObject *const *args, Py_ssize_t n)
 {
     long counts;
     const Target *target = arguments(args, n, &counts);
-    if (!target)
-        return NULL;
-    int32_t moved = (int32_t)((uint32_t)counts - (uint32_t)self->counts);
-    self->counts = (int32_t)counts;
-    self->position += (int64_t)moved * 65536;
-    int64_t error = (int64_t)(target->position_counts * 65536.0) - self->position;
-    self->rate = self->keep * self->rate + self->scale * ((double)(error - self->error) * (1.0 / 65536.0));
-    self->error = error;
-    self->tick_error = (double)error * (1.0 / 65536.0) * self->radians_per_count;
-    self->tick_rate = self->rate;
-    self->terms[0] = -(self->kp * self->tick_error);
-    self->terms[1] = -(self->kd * self->tick_rate);
-    double volts = self->terms[0] + self->terms[1] + self->offset;
-    self->offset *= self->decay;
-    self->limit = 0;
-    if (volts < self->lowest) {
-        volts = self->lowest;
-        self->limit = 1;
-    } else if (volts > self->highest) {
-        volts = self->highest;
-        self->limit = 2;
-    } else if (volts != volts) {
-        volts = self->highest;
-        self->limit = 3;
-    }
-    self->demand = volts;
-    double code = (volts - self->dac_lowest) * self->per_volt + 0.5;
-    code = code < 0.0 ? 0.0 : code > self->top ? self->top : code;
-    self->code = (uint16_t)code;
-    self->applied = self->dac_lowest + self->dac_step * self->code;
-    return PyFloat_FromDouble(self->demand);
+    return target ? PyFloat_FromDouble(servo_step(&self->servo, (int32_t)counts, target->position_counts)) : NULL;
 }
 
 static PyMethodDef Servo_methods[] = {
