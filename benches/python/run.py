@@ -18,6 +18,7 @@ os.environ["OMP_WAIT_POLICY"] = "passive"
 
 import c_peer
 import call
+import diffrax_peer
 import imports
 import numba_peer
 import ours
@@ -64,6 +65,9 @@ def one_run(job: str, quick: bool) -> list[Row]:
         (Candidate("SciPy RK45, its defaults", lambda: scipy_peer.run(job), slow), targets["scipy"]),
         (Candidate("numba RK4, 10 steps a sample", lambda: numba_peer.run(job), fast), targets["numba"]),
     ]
+    if diffrax_peer.INSTALLED:
+        diffrax_peer.run(job)  # compiles
+        peers.append((Candidate("diffrax Tsit5, 1e-6", lambda: diffrax_peer.run(job), fast), None))
     if not quick:
         path = scenario.path().table()["position_rad"]
         peers += [

@@ -1,0 +1,88 @@
+"""Peer: diffrax's Tsit5 on JAX, compiled, with an event at the stop and a restart at each sample; where installed."""
+
+import functools
+import importlib.util
+import math
+
+from job import (
+    COUNTS_PER_TURN,
+    DAMPING,
+    DRIVE,
+    DURATION,
+    GAIN,
+    HIGHEST,
+    INERTIA,
+    KD,
+    KP,
+    LOWEST,
+    MU_D,
+    MU_S,
+    PERIOD,
+    RATES,
+    SETTLE,
+    SMOOTHING,
+    TURN,
+    V_S,
+    Figures,
+)
+
+INSTALLED = importlib.util.find_spec("diffrax") is not None
+
+
+@functools.cache
+def compiled():
+    """The loop, a function of the path's rate. Imports JAX, which takes seconds."""
+    import diffrax
+    import jax
+    import jax.numpy as jnp
+    import optimistix
+
+    jax.config.update("jax_enable_x64", True)
+    ticks, settled = round(DURATION / PERIOD), round(SETTLE / PERIOD)
+
+    def rates(_, state, brake):
+        velocity = state[1]
+        friction = (MU_D + (MU_S - MU_D) * jnp.exp(-jnp.abs(velocity) / V_S)) * brake
+        return jnp.stack([velocity, (DRIVE - friction - DAMPING * velocity) / INERTIA])
+
+    stop = diffrax.Event(lambda t, y, args, **_: y[1], optimistix.Newton(1e-10, 1e-10), direction=False)
+    control = diffrax.PIDController(rtol=1e-6, atol=1e-9)
+
+    def moved(position, velocity, brake):
+        start = jnp.stack([jnp.zeros_like(position), velocity])
+        term, solver = diffrax.ODETerm(rates), diffrax.Tsit5()
+        solution = diffrax.diffeqsolve(
+            term, solver, 0.0, PERIOD, PERIOD, start, brake, stepsize_controller=control, event=stop
+        )
+        way, after = solution.ys[-1]
+        return position + way, jnp.where(solution.event_mask, 0.0, after), solution.event_mask
+
+    def tick(state, k, rate):
+        position, velocity, stuck, last, error_rate = state
+        target = rate * (k * PERIOD)
+        error = target - jnp.floor(position * (COUNTS_PER_TURN / TURN)) * (TURN / COUNTS_PER_TURN)
+        error_rate = (1.0 - SMOOTHING) * error_rate + (SMOOTHING / PERIOD) * (error - last)
+        brake = GAIN * jnp.clip(-(KP * error + KD * error_rate), LOWEST, HIGHEST)
+        holds = MU_S * brake >= DRIVE
+        rests = stuck & holds
+        after, speed, stops = jax.lax.cond(
+            rests, lambda: (position, velocity, jnp.array(False)), lambda: moved(position, velocity, brake)
+        )
+        sticks = stops & holds
+        return (after, speed, rests | sticks, error, error_rate), (target - position, sticks)
+
+    @jax.jit
+    def loop(rate):
+        zero = jnp.zeros(())
+        start = (zero, zero, jnp.array(True), zero, zero)
+        _, (errors, sticks) = jax.lax.scan(lambda s, k: tick(s, k, rate), start, jnp.arange(ticks))
+        errors, sticks = errors[settled:], sticks[settled:]
+        return jnp.mean(errors**2), jnp.max(jnp.abs(errors)), jnp.sum(sticks)
+
+    return loop
+
+
+def run(job: str) -> Figures:
+    """The job, once."""
+    square, worst, sticks = compiled()(RATES[job])
+    return Figures(math.sqrt(float(square)), float(worst), int(sticks))
