@@ -18,7 +18,7 @@ from clutch import _clutch
 for rate in (20.0, 2.0):
     rows = [[float(kp)] for kp in range(4000, 6000, 50)]
     base = clutch.Scenario.load("pd_2", {"reference.ramp.rate_deg_s": rate, "run.duration_s": 10.0})
-    sweep = _clutch.Sweep(base._tables(), ["law.pd.kp_v_rad"], rows, ["max_error_rad"], threads=1)
+    sweep = _clutch.Sweep(base, ["law.pd.kp_v_rad"], rows, ["max_error_rad"], threads=1)
     begin = time.process_time()
     sweep.start()
     while not sweep.wait(10.0):

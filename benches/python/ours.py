@@ -30,7 +30,7 @@ def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
 def run_in(instructions: str, job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
     """As `run_many`, in lanes of these instructions. A shaft that stops goes on alone, by the widest that there are."""
     keys, rows = ["law.pd.kp_v_rad", "law.pd.kd_v_s_rad"], [list(pair) for pair in pairs]
-    sweep = _clutch.Sweep(job._tables(), keys, rows, METRICS, threads=os.cpu_count(), instructions=instructions)
+    sweep = _clutch.Sweep(job, keys, rows, METRICS, threads=os.cpu_count(), instructions=instructions)
     sweep.start()
     while not sweep.wait(10.0):
         pass

@@ -555,10 +555,10 @@ class Sweep:
     """
     A sweep that runs in threads of its own; `clutch.sweep` is its public form.
     """
-    def __new__(cls, /, tables: dict[str, Any], keys: Sequence[str], rows: list[list[object]], metrics: Sequence[str], traces: Sequence[str] = ..., every: SupportsIndex = 1, threads: SupportsIndex | None = None, instructions: str | None = None) -> Sweep:
+    def __new__(cls, /, scenario: _model.Scenario | Scenario, keys: Sequence[str], rows: list[list[object]], metrics: Sequence[str], traces: Sequence[str] = ..., every: SupportsIndex = 1, threads: SupportsIndex | None = None, instructions: str | None = None) -> Sweep:
         """
-        `rows` of values for the dotted `keys`, over the scenario's tables. `instructions` are those of the lanes, for
-        comparisons; else the widest that the processor has.
+        `rows` of values for the dotted `keys`, over a scenario. `instructions` are those of the lanes, for comparisons;
+        else the widest that the processor has.
         """
     def cancel(self, /) -> None:
         """

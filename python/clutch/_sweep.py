@@ -361,7 +361,7 @@ def sweep(
     every
         Keep each `every`-th sample, from the first.
     threads
-        Number of threads in this process. Default: one for each core.
+        Number of threads in this process, at most: few short runs take fewer. Default: one for each core.
     executor
         Runs chunks of rows, each on one thread: see `clutch.executors`. Default: threads of this process.
     chunk
@@ -401,7 +401,7 @@ def sweep(
     if every < 1 or (chunk is not None and chunk < 1) or (threads is not None and threads < 1):
         raise ValueError(f"expected at least 1: every={every}, chunk={chunk}, threads={threads}")
     work = _Work(
-        tables=scenario._tables(),
+        base=scenario,
         keys=chosen.keys,
         metrics=_known_metrics(metrics),
         traces=_known_traces(traces, scenario, chosen, law),
@@ -493,7 +493,7 @@ def _known_traces(
 class _Work:
     """The common part of all runs of a sweep; it travels to the workers."""
 
-    tables: dict[str, Any]
+    base: Scenario
     keys: tuple[str, ...]
     metrics: list[str]
     traces: list[str]
@@ -520,7 +520,7 @@ class _Work:
             i = keys.index("rig.base")
             keys = ["rig", *keys[:i], *keys[i + 1 :]]
             values = [[{"base": row[i]}, *row[:i], *row[i + 1 :]] for row in values]
-        return _clutch.Sweep(self.tables, keys, values, self.metrics, self.traces, self.every, threads)
+        return _clutch.Sweep(self.base, keys, values, self.metrics, self.traces, self.every, threads)
 
 
 class _OwnLaw:
@@ -528,7 +528,6 @@ class _OwnLaw:
 
     def __init__(self, work: _Work, rows: Sequence[Sequence[Any]]) -> None:
         self._work, self._rows = work, rows
-        self._base = Scenario._build(work.tables)
         self._done: list[Result | ParamError] = []
         self._stopped = False
 
@@ -556,7 +555,7 @@ class _OwnLaw:
             overrides = dict(zip(self._work.keys, self._rows[len(self._done)], strict=True))
             try:
                 law = as_law(copy.deepcopy(self._work.law))
-                self._done.append(simulate(self._base, law=law, overrides=overrides))
+                self._done.append(simulate(self._work.base, law=law, overrides=overrides))
             except ParamError as error:
                 self._done.append(error)
         return True

@@ -55,6 +55,10 @@ const NAMED: &[(&str, &str)] = &[
         "-> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]",
     ),
     (
+        "def __new__(cls, /, scenario: Any, keys: Sequence[str]",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario, keys: Sequence[str]",
+    ),
+    (
         "def __new__(cls, /, scenario: Any) -> Servo",
         "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo",
     ),

@@ -1,7 +1,8 @@
 //! Sweeps in the background, on all cores.
 
-use crate::convert::{scenario_error, to_table, to_toml};
+use crate::convert::{scenario_error, to_toml};
 use crate::run::sample_columns;
+use crate::stepping::native;
 use crate::table::{Column, Table};
 use clutch_sim::metrics::figure_columns;
 use clutch_sim::scenario::CERTIFIED;
@@ -83,13 +84,13 @@ pub(crate) struct Sweep {
 
 #[pymethods]
 impl Sweep {
-    /// `rows` of values for the dotted `keys`, over the scenario's tables. `instructions` are those of the lanes, for
-    /// comparisons; else the widest that the processor has.
+    /// `rows` of values for the dotted `keys`, over a scenario. `instructions` are those of the lanes, for comparisons;
+    /// else the widest that the processor has.
     #[new]
-    #[pyo3(signature = (tables, keys, rows, metrics, traces=Vec::new(), every=1, threads=None, instructions=None))]
+    #[pyo3(signature = (scenario, keys, rows, metrics, traces=Vec::new(), every=1, threads=None, instructions=None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
-        tables: &Bound<'_, PyDict>,
+        scenario: &Bound<'_, PyAny>,
         keys: Vec<String>,
         rows: &Bound<'_, PyList>,
         metrics: Vec<String>,
@@ -98,7 +99,7 @@ impl Sweep {
         threads: Option<usize>,
         instructions: Option<&str>,
     ) -> PyResult<Sweep> {
-        let base = to_table(tables)?;
+        let scenario = native(scenario)?;
         let rows = rows
             .iter()
             .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
@@ -121,7 +122,7 @@ impl Sweep {
         }
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let refused = |e: &dyn std::error::Error| PyValueError::new_err(e.to_string());
-        let sweep = sweep::Sweep::new("sweep", base, keys, rows).map_err(|e| refused(&e))?;
+        let sweep = sweep::Sweep::of("sweep", &scenario.0, keys, rows).map_err(|e| refused(&e))?;
         let sweep = match instructions {
             Some(asked) => sweep.in_lanes_of(asked).map_err(|e| refused(&e))?,
             None => sweep,

@@ -11,25 +11,28 @@ use crate::scenario::{ScalarKind, Scenario, Setter};
 use crate::scenario_error::ScenarioError;
 use fearless_simd::Level;
 use std::ops::ControlFlow;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use toml::{Table, Value};
 
 /// Rows that run side by side in one vector.
 const LANES: usize = 8;
 /// Most rows that a thread takes at once.
 const BATCH: usize = 256;
+/// Periods of runs by the exact flow that are worth a thread. A thread begins and ends for a tenth of a millisecond of
+/// processor, and the fewer rows it has, the emptier are its lanes; these take some 1 to 8 ms.
+const WORTH: u64 = 1 << 16;
 
 /// A scenario and the keys that change from row to row.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     origin: String,
-    base: Table,
+    base: Arc<Table>,
     keys: Vec<String>,
     rows: Vec<Vec<Value>>,
-    /// Instructions of its lanes.
-    level: Level,
-    /// Made of the first row that is a scenario; none if a key changes more than a value.
+    /// Instructions of its lanes; none if the rows go one by one.
+    level: Option<Level>,
+    /// Made of the scenario, or of the first row that is one; none if a key changes more than a value.
     shared: OnceLock<Option<Shared>>,
 }
 
@@ -80,19 +83,39 @@ impl Sweep {
         match rows.iter().position(|row| row.len() != keys.len()) {
             Some(row) => Err(Misfit { row, values: rows[row].len(), keys: keys.len() }),
             None => {
-                let (origin, level) = (origin.into(), Level::new());
-                Ok(Sweep { origin, base, keys, rows, level, shared: OnceLock::new() })
+                let (origin, level) = (origin.into(), Some(Level::new()));
+                Ok(Sweep { origin, base: Arc::new(base), keys, rows, level, shared: OnceLock::new() })
             }
         }
     }
 
+    /// As [`Sweep::new`], over a scenario that is checked already: it is not read again.
+    ///
+    /// # Errors
+    /// A row that has not one value for each key.
+    pub fn of(
+        origin: &str,
+        scenario: &Scenario,
+        keys: Vec<String>,
+        rows: Vec<Vec<Value>>,
+    ) -> Result<Sweep, Misfit> {
+        let sweep = Sweep { base: scenario.tables(), ..Sweep::new(origin, Table::new(), keys, rows)? };
+        // A key that this scenario does not have may be one of the rows'.
+        if let Some(shared) = sweep.share(scenario.clone()) {
+            let _ = sweep.shared.set(Some(shared));
+        }
+        Ok(sweep)
+    }
+
     /// The sweep with lanes of these instructions, `sse2`, `sse4.2`, `avx2`, `avx512` or `neon`, and not of the widest that the
-    /// processor has: for comparisons. The rows' bits are the same.
+    /// processor has; with `alone`, one row after the other: for comparisons. The rows' bits are the same.
     ///
     /// # Errors
     /// This processor does not have them.
     pub fn in_lanes_of(mut self, instructions: &str) -> Result<Sweep, NoInstructions> {
-        let known = levels();
+        let one_by_one = std::iter::once(("alone", None));
+        let known: Vec<_> =
+            levels().into_iter().map(|(name, level)| (name, Some(level))).chain(one_by_one).collect();
         match known.iter().find(|(name, _)| *name == instructions) {
             Some((_, level)) => self.level = *level,
             None => {
@@ -135,7 +158,7 @@ impl Sweep {
 
     fn on_base(&self, row: usize) -> Result<Scenario, ScenarioError> {
         let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
-        Scenario::from_table(&self.origin, self.base.clone(), &set)
+        Scenario::from_table(&self.origin, Table::clone(&self.base), &set)
     }
 
     fn share(&self, scenario: Scenario) -> Option<Shared> {
@@ -143,7 +166,18 @@ impl Sweep {
         Some(Shared { scenario, setters })
     }
 
-    /// Runs all rows on so many threads. `done` is called from these, with each finished row,
+    /// Threads that are worth their beginning: fewer than these for few short runs.
+    fn worth(&self, threads: usize, keep: Keep) -> usize {
+        let Some(Some(Shared { scenario, setters })) = self.shared.get() else { return threads };
+        let known = keep == Keep::Figures && setters.iter().all(Setter::keeps_length);
+        if !known || !scenario.flows_exactly() {
+            return threads;
+        }
+        let periods = scenario.ticks().saturating_mul(self.rows.len() as u64);
+        threads.min(usize::try_from(periods.div_ceil(WORTH)).unwrap_or(usize::MAX))
+    }
+
+    /// Runs all rows on so many threads, or fewer. `done` is called from these, with each finished row,
     /// in no order. Once `stop` is set, runs under way end within milliseconds and are not reported.
     pub fn run(
         &self,
@@ -152,6 +186,11 @@ impl Sweep {
         stop: &AtomicBool,
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
+        if self.shared.get().is_none() && !self.rows.is_empty() {
+            // Before there are threads, each of which would read the tables of its first row.
+            let _ = self.scenario(0);
+        }
+        let threads = self.worth(threads, keep);
         let next = AtomicUsize::new(0);
         let deal = Deal::of(self.rows.len(), threads, keep);
         let work = || {
@@ -194,18 +233,14 @@ impl Sweep {
             }
         }
         let mut told = vec![false; planned.len()];
-        if keep == Keep::Figures {
+        if let (Keep::Figures, Some(level)) = (keep, self.level) {
             let doubles = planned.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
             let specs = doubles.map(|(place, row)| (place, row.2.spec()));
-            let goes_on =
-                lanes::run_all(self.level, specs, &stopped, &mut |place, engine, metrics, detected| {
-                    let (i, certified, _) = &planned[place];
-                    told[place] = true;
-                    done(
-                        *i,
-                        Ok(Row { certified: *certified, run: Run::of_figures(engine, metrics, detected) }),
-                    );
-                });
+            let goes_on = lanes::run_all(level, specs, &stopped, &mut |place, engine, metrics, detected| {
+                let (i, certified, _) = &planned[place];
+                told[place] = true;
+                done(*i, Ok(Row { certified: *certified, run: Run::of_figures(engine, metrics, detected) }));
+            });
             if !goes_on {
                 return;
             }
@@ -282,6 +317,45 @@ mod tests {
         for threads in [1, 2, 7] {
             assert_eq!(outcomes(&s, threads), alone, "{threads} threads");
         }
+    }
+
+    #[test]
+    fn rows_over_a_checked_scenario_are_what_they_are_over_its_tables() {
+        let pd = Scenario::built_in("pd_2").unwrap().unwrap();
+        // The last key the scenario does not have: the first row that is one decides what it is.
+        for key in ["law.pd.kp_v_rad", "rig.base", "run.duration_s", "rig.actuator_time_constant_s"] {
+            let values = match key {
+                "rig.base" => ["ideal", "none", "bench"].map(|base| Value::String(base.into())),
+                _ => [0.05, -1.0, 2.0].map(Value::Float),
+            };
+            let rows: Vec<_> = values.map(|value| vec![value]).to_vec();
+            let over = Sweep::of("x", &pd, vec![key.to_owned()], rows.clone()).unwrap();
+            let read = Sweep::new("x", pd.table().clone(), vec![key.to_owned()], rows).unwrap();
+            let found = outcomes(&over, 2);
+            assert_eq!(found, outcomes(&read, 2), "{key}");
+            assert!(found.iter().any(Result::is_ok) && found[1].is_err(), "{key}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn few_short_runs_share_a_thread_and_long_ones_or_those_of_unknown_length_do_not() {
+        let pd = Scenario::built_in("pd_2").unwrap().unwrap();
+        let with = |seconds: f64, key: &str, rows: i64| {
+            let scenario = pd.changed(&[("run.duration_s".into(), Value::Float(seconds))]).unwrap();
+            let rows = (1..=rows).map(|i| vec![Value::Integer(i)]).collect();
+            Sweep::of("x", &scenario, vec![key.to_owned()], rows).unwrap()
+        };
+        for (seconds, rows, expected) in
+            [(2.0, 1, 1), (2.0, 32, 1), (2.0, 33, 2), (20.0, 32, 8), (200.0, 2, 7)]
+        {
+            let s = with(seconds, "run.seed", rows);
+            assert_eq!(s.worth(8, Keep::Figures), expected, "{rows} runs of {seconds} s");
+            assert_eq!(s.worth(8, Keep::Trace), 8);
+        }
+        assert_eq!(with(2.0, "run.duration_s", 2).worth(8, Keep::Figures), 8);
+        let bench = Scenario::built_in("bench_pd_2").unwrap().unwrap();
+        let seeds = Sweep::of("x", &bench, vec!["run.seed".into()], vec![vec![Value::Integer(1)]]).unwrap();
+        assert_eq!(seeds.worth(8, Keep::Figures), 8);
     }
 
     #[test]

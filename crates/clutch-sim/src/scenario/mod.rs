@@ -22,7 +22,7 @@ pub use section::check_section;
 pub use verdict::{CERTIFIED, CertificateError, Proven, STICKS, Sampled, Unproven};
 pub use written::written_value;
 
-use crate::engine::EngineError;
+use crate::engine::{EngineError, EngineKind};
 use crate::friction_map::MapGrid;
 use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
@@ -128,6 +128,13 @@ pub(crate) struct Setter {
     place: Place,
     /// The path knows nothing of it, and is not walked anew.
     keeps_path: bool,
+}
+
+impl Setter {
+    /// True if runs of all its values have as many periods.
+    pub(crate) fn keeps_length(&self) -> bool {
+        self.keeps_path || &*self.key == "run.seed"
+    }
 }
 
 /// A scenario could not be loaded.
@@ -665,6 +672,18 @@ impl Scenario {
         let mut table = Table::clone(&self.given);
         self.change(&mut table);
         table
+    }
+
+    /// As [`Scenario::table`], for many that begin with it.
+    pub(crate) fn tables(&self) -> Arc<Table> {
+        if self.changes.is_empty() { self.base.clone() } else { Arc::new(self.table().clone()) }
+    }
+
+    /// True if the exact flow moves the shaft.
+    pub(crate) fn flows_exactly(&self) -> bool {
+        let spec = self.spec();
+        let rig = Rig::new(&spec.rig, spec.run.seed).ok();
+        rig.is_some_and(|rig| spec.engine(&rig).is_ok_and(|engine| engine == EngineKind::ExactFlow))
     }
 
     fn change(&self, table: &mut Table) {
