@@ -9,6 +9,9 @@ const RAM: u32 = 0x2000_0000;
 /// Bytes that an exception puts on the stack: the registers of core and floating-point unit, and a
 /// word to align them.
 const EXCEPTION: u64 = 104 + 4;
+/// The function of an image's one task, where it has embassy's, and the most that its frame may take: no role is made in it.
+const TASK: &str = "embassy_executor::raw::TaskStorage<F>::poll";
+const FRAME: u64 = 300;
 
 /// Prints flash, static RAM, and the stacks of a period and of a run's making, of an image that is flashed; gives the values over
 /// budget.
@@ -24,8 +27,13 @@ pub(crate) fn flashed(image: &Image, budget: &Memory) -> Result<Vec<String>, Fau
     let name = &budget.image;
     println!("\nImage `{name}`, bytes: flash {flash}, static RAM {ram}");
     let mut values = vec![("flash", flash, budget.flash), ("static RAM", ram, budget.ram)];
-    // The code that polls the task, some hundreds of bytes, calls through registers, and has no bound.
     let mut stacks = Stacks::new(image);
+    // What polls the task calls through registers, and has no bound; the frame of the task is there in every period.
+    if image.function(TASK).is_ok() {
+        let frame = stacks.frame(TASK)?;
+        println!("\n| frame of the task, below both stacks | {frame} |\n|---|---|");
+        values.push(("frame of the task", frame, FRAME));
+    }
     for (what, function, may) in [
         ("stack of a period", &budget.period, budget.stack),
         ("stack of what makes a run, while nothing is driven", &budget.setup, budget.setup_stack),

@@ -38,6 +38,18 @@ impl<'a> Stacks<'a> {
         self.function(function)
     }
 
+    /// What the function of this name takes of the stack as it begins, up to its first call or jump, bytes.
+    ///
+    /// # Errors
+    /// There is no such function.
+    pub fn frame(&self, name: &str) -> Result<u64, Fault> {
+        let function = self.image.function(name)?;
+        let code = self.image.instructions(function)?;
+        let before = code.iter().take_while(|i| matches!(i.flow, Flow::Next));
+        let depth = before.fold(0, |depth, i| moved(i, depth).unwrap_or(depth));
+        Ok(depth.max(0).cast_unsigned())
+    }
+
     /// The deepest stack below a function.
     ///
     /// # Errors
