@@ -3,8 +3,11 @@
 use crate::inputs::{CORNERS, Random, ticks};
 use crate::kernels::{self, Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick};
 use crate::meter::{Tally, instructions, line};
-use clutch_core::law::{Beside, ControlLaw, LawParams, Listed, OutputParams, Tick};
-use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, StribeckParams, Target};
+use clutch_core::law::{Beside, ControlLaw, Glide, LawParams, Listed, OutputParams, Seen, Tick};
+use clutch_core::{
+    Counts, Encoder, FixedCounts, FrictionMap, Micros, Place, Plant, PlantParams, Servo, ServoParams,
+    StribeckParams, Target,
+};
 use clutch_wire::{Actuate, Decoder, Message, Sample};
 
 pub const PERIOD: Micros = Micros(1000);
@@ -40,6 +43,8 @@ pub fn measure() -> Option<()> {
     // SAFETY: a function without arguments.
     line("nothing", unsafe { instructions(nothing as extern "C" fn() as usize, [0; 3]) });
 
+    rides()?;
+
     // Laws with a model: friction whose curve needs no power, and one that does.
     let friction = StribeckParams { stribeck_exponent: 2.0, ..StribeckParams::default() };
     let (plain, output) = (PlantParams::default(), output());
@@ -61,6 +66,61 @@ pub fn measure() -> Option<()> {
 
     servo()?;
     codec();
+    Some(())
+}
+
+/// Points of a map, each four counts, of which fifteen are a wave.
+fn points() -> [u16; 256] {
+    core::array::from_fn(|i| {
+        let within = (i % 15) as u16;
+        let up = if within < 8 { within } else { 15 - within };
+        FrictionMap::ONE - 600 + 170 * up
+    })
+}
+
+/// Glide on a disc at 2 °/s, from count to count; then with rests, jumps, ends of the map and paths of any kind. Once
+/// without a map, once with the disc's.
+fn rides() -> Option<()> {
+    let (model, output, rate) = (PlantParams::default(), output(), 0.0349_f32);
+    let law =
+        Glide::build(&Glide::busiest(), &Beside { period: PERIOD, ..Beside::paper(&model, &output) }).ok()?;
+    let (pace, hold) = (
+        rate * 1e-3 * Encoder::PAPER.counts_per_radian::<f32>(),
+        Plant::new(&model).ok()?.holding_voltage_sliding(),
+    );
+    let points = points();
+    let map = FrictionMap::new(0, 4, &points).ok()?;
+    let step = kernels::glide::step as extern "C" fn(&Glide<f32>, &mut _, &Tick<f32>) -> f32;
+    for (name, mapped) in [("step_glide_ride", false), ("step_glide_map", true)] {
+        let mut tally = Tally::new(name);
+        let mut random = Random::new(5);
+        let path = Tick { target_velocity: rate, ..Tick::default() };
+        let (mut state, mut shaft, mut pace_now) = (law.start(&path, hold), 10.0_f32, pace);
+        for call in 0..4 * OF_EACH {
+            let mut tick = Tick { error: random.around(1e-4), ..path };
+            if call >= 2 * OF_EACH {
+                match random.below(64) {
+                    0 => pace_now = 0.0,
+                    1 | 2 => pace_now = pace,
+                    3 => pace_now = random.around(4.0),
+                    4 => shaft = random.around(2000.0),
+                    5 => tick = random.wild(),
+                    6 => state = law.start(&tick, random.around(10.0)),
+                    _ => {}
+                }
+            }
+            shaft += pace_now;
+            let position = FixedCounts::from_counts(shaft as i64);
+            let place: Place<f32> = map.at(position);
+            let friction = if place.is_known() { place.friction(0.0) } else { 1.0 };
+            let place = if mapped { place } else { Place::default() };
+            law.sees(&mut state, || Seen { position, applied: hold / friction, place });
+            let arguments = [&raw const law as usize, &raw mut state as usize, &raw const tick as usize];
+            // SAFETY: the arguments are those of the function.
+            tally.add(unsafe { instructions(step as usize, arguments) });
+        }
+        tally.print();
+    }
     Some(())
 }
 
