@@ -17,6 +17,8 @@ const SHARE: f64 = 0.8;
 /// Multiple of the believed friction at rest with which a motor pushes: at first, at least, at most.
 const PUSHED: f64 = 1.65;
 const PUSHES: (f64, f64) = (0.7, 5.0);
+/// Way that a motor catches up with in one step at most, counts: of fine ones a step is several, and no better for being longer.
+const FARTHEST: f64 = 2.0;
 /// Most periods of a step, whatever the path.
 const LONGEST: f64 = 64.0;
 /// Twice the way of the longest fall of a shaft of which no edge comes, counts: one, and half of it for a weaker drive.
@@ -219,7 +221,10 @@ impl<T: Real> MicroStep<T> {
         // The least m for which m² k in m (1 + ratio) periods and the delay is as fast as the path.
         let half = T::splat(0.5) * pace.abs() * (T::ONE + ratio) / (T::splat(SHARE) * k);
         let needed = half + (half * half + pace.abs() * self.delay / (T::splat(SHARE) * k)).sqrt();
-        let periods = (-(-needed).floor()).max(state.least).min(T::splat(LONGEST));
+        // A motor whose steps fall short where friction is high catches up in one, by some counts at most.
+        let far = (way * error).min(T::splat(FARTHEST));
+        let behind = if self.only == T::ZERO { (far / k).sqrt().floor() } else { T::ZERO };
+        let periods = (-(-needed).floor()).max(state.least).max(behind).min(T::splat(LONGEST));
         // A path that goes one way is not gone back on, nor can a brake.
         let along = way * pace >= T::ZERO && way * self.only >= T::ZERO;
         if along && way * error > T::splat(0.5) * k * periods * periods {
@@ -356,6 +361,21 @@ mod tests {
         let fine = MicroStep::new(1.0, (0.09, 0.17), 0.0, (0.0, 0.0));
         let (_, state) = errors(&fine, &mut shaft(0.09, 0.17), 0.005);
         assert_eq!(state.push, PUSHED);
+    }
+
+    #[test]
+    fn a_motor_that_has_fallen_behind_takes_a_step_as_long_as_its_way_and_a_brake_none() {
+        let (go, stop) = (0.09, 0.17);
+        let k = 0.5 * go * (1.0 + go / stop);
+        for (only, error, periods) in [(0.0, 1.2, 4.0), (0.0, -1.2, 4.0), (0.0, 0.1, 1.0), (1.0, 1.2, 1.0)] {
+            let steps = MicroStep::new(1.0, (go, stop), only, (0.0, 0.0));
+            let mut state = begun();
+            // From the middle of a count.
+            steps.demand(&mut state, 0.0, 0.5 + error, 0.001);
+            steps.demand(&mut state, 0.0, 0.5 + error, 0.001 * error.signum());
+            assert_eq!(state.periods, periods, "{only}, {error}");
+            assert!(k * periods * periods <= error.abs().max(2.0 * k), "no farther than the path");
+        }
     }
 
     #[test]
