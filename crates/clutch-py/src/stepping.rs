@@ -16,8 +16,10 @@ use clutch_sim::engine::{EngineError, Event, EventKind, Motion};
 use clutch_sim::friction_map::MapGrid;
 use clutch_sim::scenario::ScalarKind;
 use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::ffi::PyLong_AsLongAndOverflow;
+use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat};
+use pyo3::types::{PyDict, PyFloat, PyInt};
 use std::sync::{Arc, Mutex};
 
 type State<T> = ServoState<T, LawState<T>>;
@@ -127,8 +129,31 @@ macro_rules! either {
     };
 }
 
+/// Counts as Python gives them, a number of any kind. Of an `int` the value is read as it stands: as an `f64` it would
+/// become a `float` first, each period.
+struct Given(f64);
+
+impl<'py> FromPyObject<'_, 'py> for Given {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = f64::INPUT_TYPE;
+
+    #[inline(always)]
+    fn extract(number: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if number.is_exact_instance_of::<PyInt>() {
+            let mut overflow = 0;
+            // SAFETY: a borrowed object is alive, and this one is an `int`.
+            let whole = unsafe { PyLong_AsLongAndOverflow(number.as_ptr(), &mut overflow) };
+            if overflow == 0 {
+                return Ok(Given(whole as f64));
+            }
+        }
+        number.extract().map(Given)
+    }
+}
+
 /// Counts as a number that the law takes: whole ones within 32 bit unless the sensor is ideal.
-fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
+fn checked_counts(Given(counts): Given, whole: bool) -> PyResult<f64> {
     let fits = if whole {
         // Not `fract`, which is a call without SSE4.1.
         f64::from(counts as i32) == counts
@@ -167,7 +192,7 @@ impl Servo {
 
     /// Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
     #[pyo3(signature = (counts, target, voltage))]
-    fn start(&mut self, counts: f64, target: &Target, voltage: f64) -> PyResult<()> {
+    fn start(&mut self, counts: Given, target: &Target, voltage: f64) -> PyResult<()> {
         let whole = self.whole;
         let counts = checked_counts(counts, whole)?;
         if !voltage.is_finite() {
@@ -190,7 +215,7 @@ impl Servo {
     /// -------
     /// float
     ///     The voltage to command, V, as the converter gives it.
-    fn step(&mut self, counts: f64, target: &Target) -> PyResult<f64> {
+    fn step(&mut self, counts: Given, target: &Target) -> PyResult<f64> {
         Ok(self.answer(checked_counts(counts, self.whole)?, target))
     }
 
@@ -340,7 +365,7 @@ impl StickSlip {
     /// -------
     /// bool
     ///     True if a stick is detected at this sample.
-    fn update(&mut self, counts: f64, velocity_rad_s: f64) -> PyResult<bool> {
+    fn update(&mut self, counts: Given, velocity_rad_s: f64) -> PyResult<bool> {
         let counts = Counts(checked_counts(counts, true)? as i64 as i32);
         Ok(match &mut self.0 {
             Sticks::F32(detector, state) => detector.update(state, counts, f32::from_f64(velocity_rad_s)),
