@@ -1,10 +1,6 @@
 """Peers in C, many gains side by side in vectors, compiled where they run; on one core.
 
 `brute` is RK4 with ten steps per sample, `exact` the flow by quadrature.
-
-    python benches/python/c_peer.py
-
-prints how far `exact` is from SciPy's DOP853 where no encoder rounds, as a table in Markdown.
 """
 
 import ctypes
@@ -16,9 +12,8 @@ import tempfile
 
 import numpy as np
 
-import job
-import reference
-from job import Figures, gains
+import job as numbers
+from job import Figures, Job, gains
 
 #: What each is called in a table.
 NAMES = {"brute": "RK4, 10 steps a sample", "exact": "exact flow"}
@@ -27,7 +22,7 @@ SIDE = 16
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
-class Job(ctypes.Structure):
+class Numbers(ctypes.Structure):
     """The numbers of the job, as vectors.h has them."""
 
     _fields_ = [
@@ -64,50 +59,28 @@ def build(peer: str, march: str) -> ctypes.CDLL:
         return ctypes.CDLL(str(library))
 
 
-def numbers(rate: float, counts_per_radian: float, duration: float, settle: float) -> Job:
-    """The job, with the rest as it is."""
-    return Job(
-        *(job.INERTIA, job.DRIVE, job.DAMPING, job.GAIN, job.MU_S, job.MU_D, job.V_S),
-        *(job.SMOOTHING, counts_per_radian, job.LOWEST, job.HIGHEST, job.PERIOD, rate),
-        *(round(duration / job.PERIOD), round(settle / job.PERIOD)),
+def told(job: Job) -> Numbers:
+    return Numbers(
+        *(numbers.INERTIA, numbers.DRIVE, numbers.DAMPING, numbers.GAIN, numbers.MU_S, numbers.MU_D, numbers.V_S),
+        *(numbers.SMOOTHING, job.counts_per_turn / numbers.TURN, numbers.LOWEST, numbers.HIGHEST),
+        *(numbers.PERIOD, job.rate, job.ticks, job.settled),
     )
 
 
-def run_many(peer: str, name: str, n: int, march: str) -> Figures:
+def run_many(peer: str, job: Job, n: int, march: str) -> Figures:
     """The job with `n` pairs of gains, for `brute` a multiple of `SIDE`; the mean of the figures."""
     if peer == "brute" and n % SIDE:
         raise ValueError(f"n = {n}: expected a multiple of {SIDE}")
-    of = numbers(job.RATES[name], job.COUNTS_PER_TURN / job.TURN, job.DURATION, job.SETTLE)
     kp, kd = np.array(gains(n)).T.copy()
     out = np.empty((n, 3))
     pointers = (array.ctypes.data_as(DOUBLES) for array in (kp, kd, out))
-    build(peer, march).sweep(ctypes.byref(of), ctypes.c_int64(n), *pointers)
+    build(peer, march).sweep(ctypes.byref(told(job)), ctypes.c_int64(n), *pointers)
     return Figures(*map(float, out.mean(axis=0)))
 
 
-def accuracy(march: str) -> list[tuple[float, float, float, int, float]]:
-    """Rate in °/s, gains, sticks and the largest distance of `exact` from the oracle, rad; 0.5 s without an encoder."""
-    found = []
-    for rate, kp, kd in ((20.0, 5000.0, 50.0), (2.0, 5000.0, 50.0), (2.0, 5000.0, 5.0), (20.0, 20_000.0, 5.0)):
-        radians = math.radians(rate)
-        # Counts of 1e-15 rad are none.
-        of = numbers(radians, 1e15, 0.5, 0.0)
-        positions = np.empty(of.ticks)
-        pointer = positions.ctypes.data_as(DOUBLES)
-        build("exact", march).path(ctypes.byref(of), ctypes.c_double(kp), ctypes.c_double(kd), pointer)
-        loop = reference.loop(reference.Pd(kp, kd), None)
-        result = loop.run(radians * np.arange(of.ticks) * job.PERIOD, np.full(of.ticks, radians))
-        worst = float(abs(positions - result["position"]).max())
-        found.append((rate, kp, kd, len(result.times("stick")), worst))
-    return found
-
-
-def main() -> None:
-    print("| instructions | °/s | K_p | K_d | sticks | largest distance, rad |\n|---|---|---|---|---|---|")
-    for name, _, march in instructions():
-        for rate, kp, kd, sticks, worst in accuracy(march):
-            print(f"| {name} | {rate:g} | {kp:g} | {kd:g} | {sticks} | {worst:.1e} |")
-
-
-if __name__ == "__main__":
-    main()
+def move(job: Job, march: str, seen: np.ndarray) -> Figures:
+    """The job once by `exact`, whose sticks are not told; `seen` gets the positions."""
+    pointer = seen.ctypes.data_as(DOUBLES)
+    build("exact", march).path(ctypes.byref(told(job)), ctypes.c_double(job.kp), ctypes.c_double(job.kd), pointer)
+    error = (job.rate * numbers.PERIOD * np.arange(job.ticks) - seen)[job.settled :]
+    return Figures(float(np.sqrt(np.mean(error**2))), float(abs(error).max()), math.nan)

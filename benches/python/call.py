@@ -8,7 +8,7 @@ import tempfile
 from types import ModuleType
 
 import clutch
-from job import COUNTS_PER_TURN, HIGHEST, KD, KP, LOWEST, PERIOD, RATES, SMOOTHING, TURN, toml
+from job import COUNTS_PER_TURN, HIGHEST, JOBS, KD, KP, LOWEST, PERIOD, SMOOTHING, TURN, toml
 from timing import Candidate
 
 CALLS = 20_000
@@ -31,18 +31,19 @@ def build(name: str) -> ModuleType:
 def candidates(rounds: int) -> list[Candidate]:
     """Ours, the floors, and the loop around them, which is subtracted."""
     floor, stable = build("floor"), build("stable")
-    per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
+    job = JOBS["J2"]
+    per_tick = job.rate * PERIOD * COUNTS_PER_TURN / TURN
     ticks = range(CALLS)
     # The shaft a few counts ahead of the path, as on a ramp; and the numbers a caller would have at hand.
     counts = [int(per_tick * k) + k % 3 for k in ticks]
     positions = [per_tick * k for k in ticks]
 
-    ours = clutch.Servo(clutch.Scenario.from_toml(toml("J2")))
-    our_targets = [clutch.Target(p, RATES["J2"], 0.0) for p in positions]
+    ours = clutch.Servo(clutch.Scenario.from_toml(toml(job)))
+    our_targets = [clutch.Target(p, job.rate, 0.0) for p in positions]
     ours.start(0, our_targets[0], 0.0)
     numbers = (KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
     law, servo, checked = floor.Law(*numbers), floor.Servo(*numbers), stable.Servo(*numbers)
-    floor_targets, stable_targets = ([of.Target(p, RATES["J2"], 0.0) for p in positions] for of in (floor, stable))
+    floor_targets, stable_targets = ([of.Target(p, job.rate, 0.0) for p in positions] for of in (floor, stable))
     floors = ((law, floor_targets), (servo, floor_targets), (checked, stable_targets))
 
     # Before anything is timed: all are the same law. Ours and the servo take targets in whole 2^-16 counts, up to 24 µV

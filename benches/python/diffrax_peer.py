@@ -5,40 +5,35 @@ import importlib.util
 import math
 
 from job import (
-    COUNTS_PER_TURN,
     DAMPING,
     DRIVE,
-    DURATION,
     GAIN,
     HIGHEST,
     INERTIA,
-    KD,
-    KP,
     LOWEST,
     MU_D,
     MU_S,
     PERIOD,
-    RATES,
-    SETTLE,
     SMOOTHING,
     TURN,
     V_S,
     Figures,
+    Job,
 )
 
 INSTALLED = importlib.util.find_spec("diffrax") is not None
 
 
 @functools.cache
-def compiled():
-    """The loop, a function of the path's rate. Imports JAX, which takes seconds."""
+def compiled(job: Job):
+    """The loop of the job, a function of the path's rate. Imports JAX, which takes seconds."""
     import diffrax
     import jax
     import jax.numpy as jnp
     import optimistix
 
     jax.config.update("jax_enable_x64", True)
-    ticks, settled = round(DURATION / PERIOD), round(SETTLE / PERIOD)
+    ticks, settled, counts = job.ticks, job.settled, job.counts_per_turn
 
     def rates(_, state, brake):
         velocity = state[1]
@@ -60,9 +55,9 @@ def compiled():
     def tick(state, k, rate):
         position, velocity, stuck, last, error_rate = state
         target = rate * (k * PERIOD)
-        error = target - jnp.floor(position * (COUNTS_PER_TURN / TURN)) * (TURN / COUNTS_PER_TURN)
+        error = target - jnp.floor(position * (counts / TURN)) * (TURN / counts)
         error_rate = (1.0 - SMOOTHING) * error_rate + (SMOOTHING / PERIOD) * (error - last)
-        brake = GAIN * jnp.clip(-(KP * error + KD * error_rate), LOWEST, HIGHEST)
+        brake = GAIN * jnp.clip(-(job.kp * error + job.kd * error_rate), LOWEST, HIGHEST)
         holds = MU_S * brake >= DRIVE
         rests = stuck & holds
         after, speed, stops = jax.lax.cond(
@@ -82,7 +77,7 @@ def compiled():
     return loop
 
 
-def run(job: str) -> Figures:
+def run(job: Job) -> Figures:
     """The job, once."""
-    square, worst, sticks = compiled()(RATES[job])
+    square, worst, sticks = compiled(job)(job.rate)
     return Figures(math.sqrt(float(square)), float(worst), int(sticks))

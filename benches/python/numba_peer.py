@@ -6,30 +6,27 @@ import numpy as np
 from numba import njit, prange
 
 from job import (
-    COUNTS_PER_TURN,
     DAMPING,
     DRIVE,
-    DURATION,
     GAIN,
     HIGHEST,
     INERTIA,
-    KD,
-    KP,
+    JOBS,
     LOWEST,
     MU_D,
     MU_S,
     PERIOD,
-    RATES,
-    SETTLE,
     SMOOTHING,
     TURN,
     V_S,
     Figures,
+    Job,
     gains,
 )
 
 SUBSTEPS = 10
-TICKS, SETTLED = round(DURATION / PERIOD), round(SETTLE / PERIOD)
+#: For positions that nobody wants.
+NOWHERE = np.empty(0)
 
 
 @njit(fastmath=True, error_model="numpy", inline="always")
@@ -39,18 +36,20 @@ def acceleration(w, brake):
 
 
 @njit(fastmath=True, error_model="numpy")
-def loop(rate, kp, kd):
+def loop(rate, kp, kd, counts_per_turn, ticks, settled, seen):
     h = PERIOD / SUBSTEPS
     position, velocity, stuck = 0.0, 0.0, True
     last, error_rate = 0.0, 0.0
     squares, worst, sticks = 0.0, 0.0, 0
-    for k in range(TICKS):
+    for k in range(ticks):
         target = rate * (k * PERIOD)
-        if k >= SETTLED:
+        if seen.size > 0:
+            seen[k] = position
+        if k >= settled:
             true_error = target - position
             squares += true_error * true_error
             worst = max(worst, abs(true_error))
-        error = target - np.floor(position * (COUNTS_PER_TURN / TURN)) * (TURN / COUNTS_PER_TURN)
+        error = target - np.floor(position * (counts_per_turn / TURN)) * (TURN / counts_per_turn)
         error_rate = (1.0 - SMOOTHING) * error_rate + (SMOOTHING / PERIOD) * (error - last)
         last = error
         brake = GAIN * min(max(-(kp * error + kd * error_rate), LOWEST), HIGHEST)
@@ -75,39 +74,39 @@ def loop(rate, kp, kd):
                 velocity = 0.0
                 if holds:
                     stuck = True
-                    if k >= SETTLED:
+                    if k >= settled:
                         sticks += 1
                     break
             else:
                 position += (h / 6.0) * (velocity + 2.0 * (w2 + w3) + w4)
                 velocity = after
-    return squares / (TICKS - SETTLED), worst, sticks
+    return squares / (ticks - settled), worst, sticks
 
 
 @njit(parallel=True, fastmath=True, error_model="numpy")
-def sweep(rate, kp, kd, out):
+def sweep(rate, kp, kd, counts_per_turn, ticks, settled, nowhere, out):
     for i in prange(kp.shape[0]):
-        square, worst, sticks = loop(rate, kp[i], kd[i])
+        square, worst, sticks = loop(rate, kp[i], kd[i], counts_per_turn, ticks, settled, nowhere)
         out[i, 0] = math.sqrt(square)
         out[i, 1] = worst
         out[i, 2] = sticks
 
 
-def run(job: str) -> Figures:
-    """The job, once."""
-    square, worst, sticks = loop(RATES[job], KP, KD)
+def run(job: Job, seen: np.ndarray = NOWHERE) -> Figures:
+    """The job, once; `seen` gets the positions."""
+    square, worst, sticks = loop(job.rate, job.kp, job.kd, float(job.counts_per_turn), job.ticks, job.settled, seen)
     return Figures(math.sqrt(square), worst, sticks)
 
 
-def run_many(job: str, n: int) -> Figures:
+def run_many(job: Job, n: int) -> Figures:
     """The job with `n` pairs of gains; the mean of the figures."""
     kp, kd = np.array(gains(n)).T.copy()
     out = np.empty((n, 3))
-    sweep(RATES[job], kp, kd, out)
+    sweep(job.rate, kp, kd, float(job.counts_per_turn), job.ticks, job.settled, NOWHERE, out)
     return Figures(*map(float, out.mean(axis=0)))
 
 
 def compile_all() -> None:
     """Compiles both, so that no measurement pays for it."""
-    run("J20")
-    run_many("J20", 4)
+    run(JOBS["J20"])
+    run_many(JOBS["J20"], 4)

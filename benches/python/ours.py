@@ -2,29 +2,34 @@
 
 import os
 
+import numpy as np
+
 import clutch
 from clutch import _clutch
-from job import Figures, toml
+from job import Figures, Job, toml
 
 METRICS = ["rms_error_rad", "max_error_rad", "stick_slip_cycles_per_s", "measured_s"]
 
 
-def scenario(job: str, **times: float) -> clutch.Scenario:
-    """The job as an object; `times` are `duration` and `settle`, s."""
-    return clutch.Scenario.from_toml(toml(job, **times))
+def scenario(job: Job) -> clutch.Scenario:
+    """The job as an object."""
+    return clutch.Scenario.from_toml(toml(job))
 
 
-def run(job: clutch.Scenario) -> Figures:
-    """One run, of which all samples and events are kept."""
-    m = clutch.simulate(job).metrics
+def run(job: clutch.Scenario, seen: np.ndarray | None = None) -> Figures:
+    """One run, of which all samples and events are kept; `seen` gets the positions."""
+    done = clutch.simulate(job)
+    if seen is not None:
+        seen[:] = done.samples["position_rad"]
+    m = done.metrics
     return Figures(m.rms_error_rad, m.max_error_rad, round(m.stick_slip_cycles_per_s * m.measured_s))
 
 
-def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
+def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]], threads: int | None = None) -> Figures:
     """A run for each pair of gains, of which only figures are kept; their mean."""
     kp, kd = zip(*pairs, strict=True)
     samples = clutch.samples({"law.pd.kp_v_rad": kp, "law.pd.kd_v_s_rad": kd})
-    return mean(clutch.sweep(job, samples, metrics=METRICS, progress=False).table)
+    return mean(clutch.sweep(job, samples, metrics=METRICS, threads=threads, progress=False).table)
 
 
 def run_in(instructions: str, job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:

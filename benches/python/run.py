@@ -1,6 +1,6 @@
 """clutch's Python package against peers, in one run: see README.md.
 
-python benches/python/run.py [--quick] [--json FILE]
+python benches/python/run.py [--quick] [--page] [--json FILE]
 """
 
 import argparse
@@ -10,11 +10,14 @@ import json
 import math
 import os
 import pathlib
+import re
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 # Waiting threads must not burn the CPU seconds that are being counted. Before anything starts threads.
 os.environ["OMP_WAIT_POLICY"] = "passive"
+
+import numpy as np
 
 import c_peer
 import call
@@ -24,10 +27,12 @@ import numba_peer
 import ours
 import reference
 import scipy_peer
-from job import DURATION, KD, KP, RATES, Figures, gains
+from job import ACCURACY, JOBS, KD, KP, Figures, gains
 from timing import Candidate, interleave
 
 MARGIN = 1.25  # how far the cost per run may be above the best
+LOOSE, TIGHT = {}, {"rtol": 1e-6, "atol": 1e-9}  # tolerances of SciPy
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/speed.md"
 
 
 @dataclass
@@ -42,6 +47,7 @@ class Row:
     ratio: float | None = None
     target: float | None = None
     at_most: bool = False  # the target is a ceiling
+    means: str = "ratio"  # what `ratio` is, if it is none
 
     @property
     def bound(self) -> str:
@@ -54,16 +60,17 @@ class Row:
         return self.ratio <= self.target if self.at_most else self.ratio >= self.target
 
 
-def one_run(job: str, quick: bool) -> list[Row]:
-    """One run of the job: solvers that a Python user would take, and ours."""
+def one_run(name: str, quick: bool) -> list[Row]:
+    """One run of the job: solvers that a Python user would take, and ours; then those that keep figures alone."""
+    job = JOBS[name]
     scenario = ours.scenario(job)
     one = [(KP, KD)]
-    slow, fast = (1, 5) if quick else (2, 7)
-    targets = {"scipy": 4000.0, "numba": 25.0} if job == "J20" else {"scipy": 1500.0, "numba": 5.0}
-    tight = {"rtol": 1e-6, "atol": 1e-9}
+    slow, fast = (1, 5) if quick else (5, 7)
+    targets = {"scipy": 4000.0, "numba": 25.0} if name == "J20" else {"scipy": 1500.0, "numba": 5.0}
+    numba = Candidate("numba RK4, 10 steps a sample", lambda: numba_peer.run(job), fast)
     peers = [
-        (Candidate("SciPy RK45, its defaults", lambda: scipy_peer.run(job), slow), targets["scipy"]),
-        (Candidate("numba RK4, 10 steps a sample", lambda: numba_peer.run(job), fast), targets["numba"]),
+        (Candidate("SciPy RK45, its defaults", lambda: scipy_peer.run(job, **LOOSE), slow), targets["scipy"]),
+        (numba, targets["numba"]),
     ]
     if diffrax_peer.INSTALLED:
         diffrax_peer.run(job)  # compiles
@@ -71,45 +78,87 @@ def one_run(job: str, quick: bool) -> list[Row]:
     if not quick:
         path = scenario.path().table()["position_rad"]
         peers += [
-            (Candidate("SciPy RK45, 1e-6", lambda: scipy_peer.run(job, **tight), slow), targets["scipy"]),
-            (Candidate("reference, DOP853 1e-12", lambda: reference.run(job), 1), None),
-            (Candidate("reference on clutch's targets", lambda: reference.run(job, path), 1), None),
+            (Candidate("SciPy RK45, 1e-6", lambda: scipy_peer.run(job, **TIGHT), slow), targets["scipy"]),
+            (Candidate("reference, DOP853 1e-13", lambda: reference.run(job), slow), None),
+            (Candidate("reference on clutch's targets", lambda: reference.run(job, path), slow), None),
         ]
     mine = Candidate("clutch.simulate, samples kept", lambda: ours.run(scenario), fast)
-    bare = Candidate("clutch.sweep of one, figures only", lambda: ours.run_many(scenario, one), fast)
+    bare = Candidate("clutch.sweep of one", lambda: ours.run_many(scenario, one), fast)
     interleave([*(c for c, _ in peers), mine, bare])
 
-    section = f"one run, {job}"
-    rows = [Row(section, c.name, c.cpu, DURATION / c.cpu, c.result, c.cpu / mine.cpu, target) for c, target in peers]
-    rows += [Row(section, c.name, c.cpu, DURATION / c.cpu, c.result) for c in (mine, bare)]
+    def rows(section: str, peers: list[tuple[Candidate, float | None]], mine: Candidate) -> list[Row]:
+        speed = [Row(section, c.name, c.cpu, job.duration / c.cpu, c.result, c.cpu / mine.cpu, to) for c, to in peers]
+        return [*speed, Row(section, mine.name, mine.cpu, job.duration / mine.cpu, mine.result)]
+
+    only_figures = rows(f"one run, {name}, of which only figures are kept", [(numba, targets["numba"])], bare)
+    return rows(f"one run, {name}", peers, mine) + only_figures
+
+
+def accuracy(quick: bool) -> list[Row]:
+    """Positions of a run against the reference's: ours, which has targets of its own, against those on these."""
+    slow, fast = (1, 3) if quick else (5, 5)
+    rows = []
+    for name, (job, most) in ACCURACY.items():
+        scenario = ours.scenario(job)
+        path = scenario.path().table()["position_rad"]
+        engines = [
+            (of, scenario.override({"run.engine": engine}))
+            for of, engine in (("exact flow", "exact_flow"), ("Dormand–Prince", "dormand_prince"))
+        ]
+        right, right_of_ours = (
+            ("reference, DOP853 1e-13", functools.partial(reference.run, job), None, slow),
+            ("reference on clutch's targets", functools.partial(reference.run, job, path), None, slow),
+        )
+        works = [
+            ("SciPy RK45, its defaults", functools.partial(scipy_peer.run, job, **LOOSE), right, slow),
+            ("SciPy RK45, 1e-6", functools.partial(scipy_peer.run, job, **TIGHT), right, slow),
+            ("numba RK4, 10 steps a sample", functools.partial(numba_peer.run, job), right, fast),
+            *(
+                (f"C in vectors, exact flow, {width}", functools.partial(c_peer.move, job, march), right, fast)
+                for width, _, march in c_peer.instructions()[:1]
+            ),
+            right,
+            right_of_ours,
+            *((f"clutch.simulate, {of}", functools.partial(ours.run, s), right_of_ours, fast) for of, s in engines),
+        ]
+        seen = {label: np.empty(job.ticks) for label, *_ in works}
+        turns = [Candidate(label, functools.partial(work, seen=seen[label]), n) for label, work, _, n in works]
+        interleave(turns)
+        for c, (label, _, against, _) in zip(turns, works, strict=True):
+            apart = None if against is None else float(abs(seen[label] - seen[against[0]]).max())
+            target = most if label.startswith("clutch") else None
+            section = f"accuracy, {job.duration:g} s at {name}, an encoder as good as none"
+            told = {"at_most": True, "means": "position off by, rad"}
+            rows.append(Row(section, label, c.cpu, job.duration / c.cpu, c.result, apart, target, **told))
     return rows
 
 
-def many_runs(job: str, quick: bool) -> list[Row]:
+def many_runs(name: str, quick: bool) -> list[Row]:
     """Runs with different gains on all cores; CPU seconds are the sum over the cores."""
     n = 128 if quick else 4096
+    job = JOBS[name]
     scenario, pairs = ours.scenario(job), gains(n)
     rounds = 3 if quick else 5
-    targets = {"numba": 350.0, "c": 40.0} if job == "J20" else {"numba": 25.0, "c": 4.0}
-    numba = Candidate("numba RK4, 10 steps a sample, prange", lambda: numba_peer.run_many(job, n), 1)
+    targets = {"numba": 350.0, "c": 40.0} if name == "J20" else {"numba": 25.0, "c": 4.0}
+    numba = Candidate("numba RK4, 10 steps a sample, prange", lambda: numba_peer.run_many(job, n), 1 if quick else 5)
     mine = Candidate("clutch.sweep", lambda: ours.run_many(scenario, pairs), rounds)
     turns = [("", [(numba, targets["numba"])], mine)]
-    for i, (name, ours_name, march) in enumerate(c_peer.instructions()):
+    for i, (width, ours_name, march) in enumerate(c_peer.instructions()):
         peers = []
         for kind, method in c_peer.NAMES.items():
             c_peer.build(kind, march)
             work = functools.partial(c_peer.run_many, kind, job, n, march)
             target = targets["c"] if kind == "brute" else None
-            peers.append((Candidate(f"C in vectors, {method}, {name}", work, rounds), target))
+            peers.append((Candidate(f"C in vectors, {method}, {width}", work, rounds), target))
         if i == 0:  # the widest, which clutch takes by itself
             turns[0][1].extend(peers)
         else:
             narrow = functools.partial(ours.run_in, ours_name, scenario, pairs)
-            turns.append((f", {name} only", peers, Candidate("clutch.sweep", narrow, rounds)))
+            turns.append((f", {width} only", peers, Candidate("clutch.sweep", narrow, rounds)))
     rows = []
     for only, peers, our in turns:
         interleave([*(c for c, _ in peers), our])
-        section, simulated = f"{n} runs, {job}{only}", n * DURATION
+        section, simulated = f"{n} runs, {name}{only}", n * job.duration
         rows += [Row(section, c.name, c.cpu, simulated / c.cpu, c.result, c.cpu / our.cpu, to) for c, to in peers]
         rows.append(Row(section, our.name, our.cpu, simulated / our.cpu, our.result))
     return rows
@@ -125,37 +174,43 @@ def scaling(section: str, cells: list[tuple[str, int, float, Candidate]], per_se
     ]
 
 
-def scaling_in_runs(job: str, quick: bool) -> list[Row]:
+def scaling_in_runs(name: str, quick: bool) -> list[Row]:
     """Short runs, which show the cost of each run beside the simulation."""
-    scenario = ours.scenario(job, duration=1.0, settle=0.0)
+    scenario = ours.scenario(replace(JOBS[name], duration=1.0, settle=0.0))
     cells = []
-    for n in (32, 256) if quick else (32, 1000, 4096, 20000):
+    for n in (32, 256) if quick else (32, 1000, 4096, 20_000, 100_000):
         work = Candidate("", functools.partial(ours.run_many, scenario, gains(n)), 3 if quick else 5)
         cells.append((f"{n} runs of 1 s", n, 1.0, work))
-    return scaling(f"cost per run, {job}", cells, per_second=False)
+    return scaling(f"cost per run, {name}", cells, per_second=False)
 
 
-def scaling_in_time(job: str, quick: bool) -> list[Row]:
+def scaling_in_time(name: str, quick: bool) -> list[Row]:
+    """Few runs, on one thread whatever their length: for short runs a sweep takes fewer, whose lanes are fuller."""
     pairs = gains(16)
     cells = []
-    for duration in (1.0, 10.0) if quick else (1.0, 10.0, 60.0, 600.0):
-        scenario = ours.scenario(job, duration=duration, settle=0.0)
-        work = Candidate("", functools.partial(ours.run_many, scenario, pairs), 3 if quick else 5)
+    for duration in (1.0, 10.0) if quick else (1.0, 10.0, 60.0, 600.0, 3600.0):
+        scenario = ours.scenario(replace(JOBS[name], duration=duration, settle=0.0))
+        work = Candidate("", functools.partial(ours.run_many, scenario, pairs, threads=1), 3 if quick else 5)
         cells.append((f"{len(pairs)} runs of {duration:g} s", len(pairs), duration, work))
-    return scaling(f"cost per simulated second, {job}", cells, per_second=True)
+    return scaling(f"cost per simulated second, {name}, on one thread", cells, per_second=True)
 
 
-def hundred_thousand(job: str) -> list[Row]:
-    """As long as somebody waits for a table of a hundred thousand runs, on all cores: the least of three."""
-    scenario, pairs = ours.scenario(job, duration=1.0, settle=0.0), gains(100_000)
+def hundred_thousand(name: str) -> list[Row]:
+    """As long as somebody waits for a table of a hundred thousand runs, on all cores."""
+    scenario, pairs = ours.scenario(replace(JOBS[name], duration=1.0, settle=0.0)), gains(100_000)
     waits = []
-    for _ in range(3):
-        begin, before = time.perf_counter(), time.process_time()
+
+    def work() -> Figures:
+        begin = time.perf_counter()
         figures = ours.run_many(scenario, pairs)
-        waits.append((time.perf_counter() - begin, time.process_time() - before))
-    wall, cpu = min(waits)
-    section = f"100 000 runs of 1 s, {os.cpu_count()} cores, {job}; ratio: seconds until the table is there"
-    return [Row(section, "clutch.sweep", cpu, len(pairs) / cpu, figures, wall, 2.0, at_most=True)]
+        waits.append(time.perf_counter() - begin)
+        return figures
+
+    sweep = Candidate("clutch.sweep", work)
+    interleave([sweep])
+    section = f"100 000 runs of 1 s, {os.cpu_count()} cores, {name}"
+    told = {"at_most": True, "means": "s until the table is there"}
+    return [Row(section, sweep.name, sweep.cpu, len(pairs) / sweep.cpu, sweep.result, min(waits), 2.0, **told)]
 
 
 def calls(quick: bool) -> list[Row]:
@@ -178,8 +233,8 @@ def importing(quick: bool) -> list[Row]:
 
 
 def number(x: float | None, form: str = "") -> str:
-    """`x` in a form, else to three digits, but whole above 100."""
-    return "" if x is None else format(x, form or (",.0f" if x >= 100.0 else ".3g"))
+    """`x` in a form, else to three digits, but whole above 100; empty where there is none."""
+    return "" if x is None or math.isnan(x) else format(x, form or (",.0f" if x >= 100.0 else ".3g"))
 
 
 def show(rows: list[Row]) -> str:
@@ -193,7 +248,7 @@ def show(rows: list[Row]) -> str:
             columns["rms error °"] = [number(math.degrees(r.figures.rms), ".6f") for r in some]
             columns["max error °"] = [number(math.degrees(r.figures.max), ".6f") for r in some]
             columns["sticks"] = [number(r.figures.sticks) for r in some]
-        columns["ratio"] = [number(r.ratio) for r in some]
+        columns[some[0].means] = [number(r.ratio) for r in some]
         if any(r.target for r in some):
             columns["target"] = [r.bound for r in some]
             columns["reached"] = [{None: "", True: "yes", False: "**no**"}[r.reached] for r in some]
@@ -202,31 +257,42 @@ def show(rows: list[Row]) -> str:
     return "\n".join(lines[1:])
 
 
+def paste(tables: str) -> None:
+    """Puts the tables into docs/speed.md; what stands above them is written by hand."""
+    text = PAGE.read_text()
+    heading = "## The tables\n"
+    above, found, _ = text.partition(heading)
+    assert found, f"{PAGE}: no heading {heading!r}"
+    PAGE.write_text(f"{above}{heading}\n{tables}\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and runs: below 40 s")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and runs: below a minute")
+    parser.add_argument("--only", metavar="TABLE", help="tables whose names have this in them, a regular expression")
+    parser.add_argument("--page", action="store_true", help="put the tables into docs/speed.md")
     parser.add_argument("--json", metavar="FILE", type=pathlib.Path, help="write the rows here too")
     options = parser.parse_args()
     quick = options.quick
 
-    numba_peer.compile_all()
-    rows = []
-    for job in RATES:
-        rows += one_run(job, quick)
-    for job in RATES:
-        rows += many_runs(job, quick)
-    rows += calls(quick)
-    rows += importing(quick)
-    for job in RATES:
-        rows += scaling_in_runs(job, quick)
-    for job in RATES:
-        rows += scaling_in_time(job, quick)
+    parts = {f"one run, {job}": functools.partial(one_run, job, quick) for job in JOBS}
+    parts["accuracy"] = functools.partial(accuracy, quick)
+    parts |= {f"many runs, {job}": functools.partial(many_runs, job, quick) for job in JOBS}
+    parts["one call"] = functools.partial(calls, quick)
+    parts["import"] = functools.partial(importing, quick)
+    parts |= {f"cost per run, {job}": functools.partial(scaling_in_runs, job, quick) for job in JOBS}
+    parts |= {f"cost per simulated second, {job}": functools.partial(scaling_in_time, job, quick) for job in JOBS}
     if not quick:
-        rows += hundred_thousand("J20")
+        parts |= {f"100 000 runs, {job}": functools.partial(hundred_thousand, job) for job in JOBS}
+    parts = {name: work for name, work in parts.items() if re.search(options.only or "", name)}
 
-    print(show(rows))
+    numba_peer.compile_all()
+    rows = [row for work in parts.values() for row in work()]
     heavy = imports.brought_along()
-    print(f"\n`import clutch` imports {', '.join(heavy) or 'none'} of {', '.join(imports.HEAVY)}.")
+    tables = f"{show(rows)}\n\n`import clutch` imports {', '.join(heavy) or 'none'} of {', '.join(imports.HEAVY)}."
+    print(tables)
+    if options.page:
+        paste(tables)
     if options.json:
         found = [asdict(r) | {"reached": r.reached} for r in rows]
         options.json.write_text(json.dumps({"rows": found, "imported": heavy}, indent=1) + "\n")

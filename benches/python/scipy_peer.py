@@ -2,37 +2,33 @@
 
 import math
 
+import numpy as np
 from scipy.integrate import solve_ivp
 
 from job import (
-    COUNTS_PER_TURN,
     DAMPING,
     DRIVE,
-    DURATION,
     GAIN,
     HIGHEST,
     INERTIA,
-    KD,
-    KP,
     LOWEST,
     MU_D,
     MU_S,
     PERIOD,
-    RATES,
-    SETTLE,
     SMOOTHING,
     TURN,
     V_S,
     Figures,
+    Job,
 )
 
 
-def run(job: str, **tolerances: float) -> Figures:
-    """The job; `tolerances` are solve_ivp's `rtol` and `atol`, its own defaults if not given."""
+def run(job: Job, seen: np.ndarray | None = None, **tolerances: float) -> Figures:
+    """The job; `seen` gets the positions. `tolerances` are solve_ivp's `rtol` and `atol`, else its own defaults."""
     exp = math.exp
-    rate = RATES[job]
-    ticks, settled = round(DURATION / PERIOD), round(SETTLE / PERIOD)
-    counts_per_rad, rad_per_count = COUNTS_PER_TURN / TURN, TURN / COUNTS_PER_TURN
+    rate, kp, kd = job.rate, job.kp, job.kd
+    ticks, settled = job.ticks, job.settled
+    counts_per_rad, rad_per_count = job.counts_per_turn / TURN, TURN / job.counts_per_turn
 
     def slip(t, y, brake):
         # Friction keeps the direction of the slip, also where a trial step looks beyond the stop.
@@ -50,6 +46,8 @@ def run(job: str, **tolerances: float) -> Figures:
     squares, worst, sticks = 0.0, 0.0, 0
     for k in range(ticks):
         target = rate * (k * PERIOD)
+        if seen is not None:
+            seen[k] = position
         if k >= settled:
             true_error = target - position
             squares += true_error * true_error
@@ -57,7 +55,7 @@ def run(job: str, **tolerances: float) -> Figures:
         error = target - math.floor(position * counts_per_rad) * rad_per_count
         error_rate = (1.0 - SMOOTHING) * error_rate + SMOOTHING * (error - last) / PERIOD
         last = error
-        volts = min(max(-(KP * error + KD * error_rate), LOWEST), HIGHEST)
+        volts = min(max(-(kp * error + kd * error_rate), LOWEST), HIGHEST)
         brake = GAIN * volts
 
         stuck = stuck and MU_S * brake >= DRIVE

@@ -5,15 +5,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-LONG = 2.0  # CPU s: after a warm-up as long as this, which then counts, one turn more is enough
+LONG = 2.0  # CPU s: a warm-up as long as this is steady, and counts as a turn
 
 
 @dataclass
 class Candidate:
     """Something to be timed.
 
-    `work` is called `repeat` times in a turn; `repeat` is raised until a turn lasts `shortest` seconds. It
-    takes part in the first `rounds` rounds only: one turn of a slow candidate is long enough to be steady.
+    `work` is called `repeat` times in a turn; `repeat` is raised until a turn lasts `shortest` seconds. There are
+    `rounds` turns; before a single one, nothing is warmed up.
     """
 
     name: str
@@ -47,8 +47,7 @@ def interleave(candidates: list[Candidate]) -> None:
                 took = c.turn()
             if took > LONG:
                 c.turns.append(took / c.repeat)
-                c.rounds = 1
-    for i in range(max(c.rounds for c in candidates)):
-        turn = [c for c in candidates if c.rounds > i]
-        for c in turn if i % 2 == 0 else reversed(turn):
+    turn = candidates
+    while turn := [c for c in reversed(turn) if len(c.turns) < c.rounds]:
+        for c in turn:
             c.turns.append(c.turn() / c.repeat)
