@@ -1,6 +1,6 @@
 """clutch's Python package against peers, in one run: see README.md.
 
-python benches/python/run.py [--quick] [--page] [--json FILE]
+python benches/python/run.py [--quick] [--before COMMIT] [--page] [--json FILE]
 """
 
 import argparse
@@ -19,6 +19,7 @@ os.environ["OMP_WAIT_POLICY"] = "passive"
 
 import numpy as np
 
+import before
 import c_peer
 import call
 import diffrax_peer
@@ -213,6 +214,22 @@ def hundred_thousand(name: str) -> list[Row]:
     return [Row(section, sweep.name, sweep.cpu, len(pairs) / sweep.cpu, sweep.result, min(waits), 2.0, **told)]
 
 
+def on_bench(commit: str) -> list[Row]:
+    """Runs on uneven discs: in lanes, one by one, and by the package of an earlier commit."""
+    rows = []
+    for name, turns in before.measured(commit).items():
+        lanes = turns["clutch.sweep"]
+        target = {"PD": 40.0, "SMC": 30.0}[name.split()[0]]
+        section = f"{before.RUNS} runs of {before.DURATION:g} s on `bench`, {name}"
+        for candidate, found in turns.items():
+            ratio, to = (None, None) if found is lanes else (found.cpu_s / lanes.cpu_s, target)
+            # What the lanes themselves bring has no goal of its own.
+            to = to if candidate.startswith("before") else None
+            speed = before.RUNS * before.DURATION / found.cpu_s
+            rows.append(Row(section, candidate, found.cpu_s, speed, found.figures, ratio, to))
+    return rows
+
+
 def calls(quick: bool) -> list[Row]:
     """Cost of one step of the law; the loop around it is subtracted."""
     mine, law, servo, checked, empty = call.candidates(5 if quick else 15)
@@ -269,6 +286,7 @@ def paste(tables: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer rounds and runs: below a minute")
+    parser.add_argument("--before", metavar="COMMIT", help="build this commit's package, and compare runs on `bench`")
     parser.add_argument("--only", metavar="TABLE", help="tables whose names have this in them, a regular expression")
     parser.add_argument("--page", action="store_true", help="put the tables into docs/speed.md")
     parser.add_argument("--json", metavar="FILE", type=pathlib.Path, help="write the rows here too")
@@ -278,6 +296,8 @@ def main() -> None:
     parts = {f"one run, {job}": functools.partial(one_run, job, quick) for job in JOBS}
     parts["accuracy"] = functools.partial(accuracy, quick)
     parts |= {f"many runs, {job}": functools.partial(many_runs, job, quick) for job in JOBS}
+    if options.before:
+        parts["bench"] = functools.partial(on_bench, options.before)
     parts["one call"] = functools.partial(calls, quick)
     parts["import"] = functools.partial(importing, quick)
     parts |= {f"cost per run, {job}": functools.partial(scaling_in_runs, job, quick) for job in JOBS}
