@@ -426,6 +426,7 @@ fn certified(runs: u64) -> Result<()> {
     for table in ["integral", "shell", "rates", "motor"] {
         write_between("docs/certified.md", table, &table_of("certified", &[table])?)?;
     }
+    write_between("docs/certified.md", "part", &table_in("clutch-loop", "part_period", &[])?)?;
     write_between("docs/certified.md", "table", &table_of("certified", &["table"])?)
 }
 
