@@ -43,7 +43,7 @@ fn the_truth_lies_between_the_bounds_on_every_disc() {
     assert!(all > 3_000.0 && sure > 1_000.0, "{sure} sure of {all}");
 }
 
-/// Of micro-steps a count holds several: counts show that the shaft has stuck, and no more.
+/// Of micro-steps a coarse count holds several: counts show that the shaft has stuck, and no more.
 #[test]
 fn micro_steps_are_a_lower_bound_and_no_number() {
     let micro = |below: f64| ("law.glide.micro_below_deg_s", Value::Float(below));
@@ -54,7 +54,9 @@ fn micro_steps_are_a_lower_bound_and_no_number() {
             panic!("{rate} °/s, {counts}: {:?}", run.detected)
         };
         let truth = run.metrics.stick_slip_cycles_per_s;
-        assert!(least > 1.0 && truth > 1.1 * least, "{rate} °/s, {counts}: {truth} of at least {least}");
+        // A step of half a coarse count goes over several fine ones, each of which shows it.
+        let hidden = if counts > 20_000 { 1.0 } else { 1.1 };
+        assert!(least > 1.0 && truth >= hidden * least, "{rate} °/s, {counts}: {truth} of at least {least}");
         assert_eq!(run.detected.most_cycles_per_s, None);
         assert!(run.detected.reason().unwrap().contains("micro-steps"), "{:?}", run.detected.reason());
     }

@@ -55,7 +55,7 @@ impl Detected {
             let [least, most] = self.bounds();
             if self.least_cycles_per_s.is_some() && self.most_cycles_per_s.is_none() {
                 return format!(
-                    "the law went in micro-steps, of which a count holds several: the shaft has stuck in {} counts/s",
+                    "the law went in micro-steps, of which a count may hold several: the shaft has stuck in {} counts/s",
                     number(least)
                 );
             }
