@@ -45,11 +45,13 @@ def test_the_page_follows_a_loop_and_its_button_stops_it(clutch, page, tmp_path)
         wait_for(page, "typeof data == 'object' && data.t.length > 1500")
         assert text(page, "scenario") == "SMC at 2 °/s on a board"
         assert text(page, "state") == "running"
-        # New frames come some thirty times a second; a busy machine may have fewer.
-        before, begun = page.run("data.t[data.t.length - 1]"), time.monotonic()
-        time.sleep(1)
-        moved = page.run("data.t[data.t.length - 1]") - before
-        assert 0.3 < moved / (time.monotonic() - begun) < 1.2
+        # New frames come some thirty times a second; a busy machine may have fewer, and none for a second.
+        before, begun, pace = page.run("data.t[data.t.length - 1]"), time.monotonic(), 0.0
+        while pace < 0.3 and time.monotonic() < begun + 10:
+            time.sleep(1)
+            moved = page.run("data.t[data.t.length - 1]") - before
+            pace = moved / (time.monotonic() - begun)
+        assert 0.3 < pace < 1.2
         page.run("document.getElementById('stop').click()")
         assert process.wait(timeout=20) == 4
         wait_for(page, "document.getElementById('stop').disabled")
