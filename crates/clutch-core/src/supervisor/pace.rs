@@ -55,6 +55,14 @@ mod tests {
     }
 
     #[test]
+    fn half_is_forgotten_behind_the_memory_and_not_at_its_end() {
+        let apart = MEMORY / TOLERANCE + 1;
+        let once = |expected: i32| Pace::default().pass(expected.unsigned_abs(), expected + apart, 0);
+        assert_eq!(once(MEMORY), Some(apart));
+        assert_eq!(once(MEMORY + 2), Some(apart / 2));
+    }
+
+    #[test]
     fn a_stall_is_slack_and_no_share() {
         // 19 ms in which nothing came, each two seconds, and made up for at once.
         assert_eq!(

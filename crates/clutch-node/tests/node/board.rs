@@ -152,6 +152,8 @@ fn a_board_that_cannot_be_is_named() {
         assert_eq!(BoardNode::new(&bad).unwrap_err(), misfit);
     }
     assert!(BoardNode::new(&BoardParams { dac_bits: 16, boot_code: u16::MAX, ..PARAMS }).is_ok());
+    // With one period alone.
+    assert!(BoardNode::new(&BoardParams { period_max_us: 500, ..PARAMS }).is_ok());
 }
 
 #[test]
@@ -291,6 +293,19 @@ fn consent_is_taken_in_ready_only() {
         assert_eq!(bench.hears(Message::Arm(ARM)), refused(Arm::KIND, Refusal::State, state as u32));
         assert_eq!(bench.state(), state);
     }
+}
+
+#[test]
+fn a_sample_waits_for_its_answer_once_there_is_consent() {
+    let mut bench = Bench::ready();
+    bench.samples();
+    assert_eq!(bench.board.unanswered(), None, "nothing is asked for");
+    let mut bench = bench.arm();
+    assert_eq!(bench.board.unanswered(), None, "the last one came before");
+    let Sample { sequence, .. } = bench.samples();
+    assert_eq!(bench.board.unanswered(), Some(sequence));
+    bench.takes(sequence, 2000);
+    assert_eq!(bench.board.unanswered(), None);
 }
 
 #[test]
