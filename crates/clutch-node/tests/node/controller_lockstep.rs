@@ -1,6 +1,9 @@
 //! Lockstep: what is written is read, and half of it is not.
 
-use clutch_node::controller_lockstep::{Exchange, HEAD, LONGEST};
+use crate::desk::{BOARD, BOARD_CONTROLLER};
+use clutch_node::controller_lockstep::{Exchange, HEAD, LONGEST, answer};
+use clutch_node::{BoardController, BoardNode, Lines, Outbox};
+use clutch_wire::{Decoder, Discover, Message, SCHEMA, VERSION, encode};
 use proptest::prelude::*;
 
 proptest! {
@@ -55,4 +58,20 @@ fn an_exchange_lies_on_the_wire_as_its_document_says() {
     let exchange = Exchange { time_ns: 0x0102_0304_0506_0708, lateness_us: 9, host: &[7], daq: &[5, 6] };
     let length = exchange.write(&mut buffer).unwrap();
     assert_eq!(buffer[..length], [8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 0, 0, 1, 0, 2, 0, 7, 5, 6]);
+}
+
+#[test]
+fn what_encoder_and_converter_say_is_with_the_host_after_the_next_exchange() {
+    let mut controller = BoardController::new(BOARD_CONTROLLER);
+    let mut board = BoardNode::new(&BOARD).unwrap();
+    let (mut lines, mut line, mut up) = (Lines::default(), Decoder::new(), Outbox::default());
+    let ask = encode(&Message::Discover(Discover { nonce: 11, version: VERSION, schema: SCHEMA }));
+    let first = Exchange { time_ns: 1_000_000, lateness_us: 0, host: ask.as_bytes(), daq: &[] };
+    let asked = answer(&mut controller, &first, &mut lines).daq.to_vec();
+    board.receive(1000, &mut line, &asked, &mut up);
+    let second = Exchange { time_ns: 2_000_000, lateness_us: 0, host: &[], daq: up.as_bytes() };
+    let said = answer(&mut controller, &second, &mut lines).host.to_vec();
+    let mut decoder = Decoder::new();
+    let heard: Vec<_> = said.iter().filter_map(|byte| decoder.push(*byte)).map(Result::unwrap).collect();
+    assert!(matches!(heard[..], [Message::Hello(hello)] if hello.board == BOARD.board), "{heard:?}");
 }
