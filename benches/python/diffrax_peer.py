@@ -4,22 +4,8 @@ import functools
 import importlib.util
 import math
 
-from job import (
-    DAMPING,
-    DRIVE,
-    GAIN,
-    HIGHEST,
-    INERTIA,
-    LOWEST,
-    MU_D,
-    MU_S,
-    PERIOD,
-    SMOOTHING,
-    TURN,
-    V_S,
-    Figures,
-    Job,
-)
+import job as numbers
+from job import Figures, Job
 
 INSTALLED = importlib.util.find_spec("diffrax") is not None
 
@@ -37,8 +23,8 @@ def compiled(job: Job):
 
     def rates(_, state, brake):
         velocity = state[1]
-        friction = (MU_D + (MU_S - MU_D) * jnp.exp(-jnp.abs(velocity) / V_S)) * brake
-        return jnp.stack([velocity, (DRIVE - friction - DAMPING * velocity) / INERTIA])
+        friction = (numbers.MU_D + (numbers.MU_S - numbers.MU_D) * jnp.exp(-jnp.abs(velocity) / numbers.V_S)) * brake
+        return jnp.stack([velocity, (numbers.DRIVE - friction - numbers.DAMPING * velocity) / numbers.INERTIA])
 
     stop = diffrax.Event(lambda t, y, args, **_: y[1], optimistix.Newton(1e-10, 1e-10), direction=False)
     control = diffrax.PIDController(rtol=1e-6, atol=1e-9)
@@ -47,18 +33,18 @@ def compiled(job: Job):
         start = jnp.stack([jnp.zeros_like(position), velocity])
         term, solver = diffrax.ODETerm(rates), diffrax.Tsit5()
         solution = diffrax.diffeqsolve(
-            term, solver, 0.0, PERIOD, PERIOD, start, brake, stepsize_controller=control, event=stop
+            term, solver, 0.0, numbers.PERIOD, numbers.PERIOD, start, brake, stepsize_controller=control, event=stop
         )
         way, after = solution.ys[-1]
         return position + way, jnp.where(solution.event_mask, 0.0, after), solution.event_mask
 
     def tick(state, k, rate):
         position, velocity, stuck, last, error_rate = state
-        target = rate * (k * PERIOD)
-        error = target - jnp.floor(position * (counts / TURN)) * (TURN / counts)
-        error_rate = (1.0 - SMOOTHING) * error_rate + (SMOOTHING / PERIOD) * (error - last)
-        brake = GAIN * jnp.clip(-(job.kp * error + job.kd * error_rate), LOWEST, HIGHEST)
-        holds = MU_S * brake >= DRIVE
+        target = rate * (k * numbers.PERIOD)
+        error = target - jnp.floor(position * (counts / numbers.TURN)) * (numbers.TURN / counts)
+        error_rate = (1.0 - numbers.SMOOTHING) * error_rate + (numbers.SMOOTHING / numbers.PERIOD) * (error - last)
+        brake = numbers.GAIN * jnp.clip(-(job.kp * error + job.kd * error_rate), numbers.LOWEST, numbers.HIGHEST)
+        holds = numbers.MU_S * brake >= numbers.DRIVE
         rests = stuck & holds
         after, speed, stops = jax.lax.cond(
             rests, lambda: (position, velocity, jnp.array(False)), lambda: moved(position, velocity, brake)

@@ -7,19 +7,7 @@
 #include <Python.h>
 #include <structmember.h>
 
-#include "servo.h"
-
-typedef struct {
-    PyObject_HEAD
-    double position_counts, velocity_rad_s, acceleration_rad_s2;
-} Target;
-
-static int Target_init(Target *self, PyObject *args, PyObject *kwargs)
-{
-    static char *names[] = {"position_counts", "velocity_rad_s", "acceleration_rad_s2", NULL};
-    return PyArg_ParseTupleAndKeywords(args, kwargs, "d|dd", names, &self->position_counts,
-                                       &self->velocity_rad_s, &self->acceleration_rad_s2) ? 0 : -1;
-}
+#include "types.h"
 
 static PyMemberDef Target_members[] = {
     {"position_counts", T_DOUBLE, offsetof(Target, position_counts), READONLY, NULL},
@@ -34,7 +22,7 @@ static PyTypeObject TargetType = {
     .tp_basicsize = sizeof(Target),
     .tp_flags = Py_TPFLAGS_DEFAULT,
     .tp_new = PyType_GenericNew,
-    .tp_init = (initproc)Target_init,
+    .tp_init = Target_init,
     .tp_members = Target_members,
 };
 
@@ -93,22 +81,6 @@ static PyTypeObject LawType = {
     .tp_methods = Law_methods,
 };
 
-typedef struct {
-    PyObject_HEAD
-    servo servo;
-} Servo;
-
-static int Servo_init(Servo *self, PyObject *args, PyObject *kwargs)
-{
-    static char *names[] = {"kp", "kd", "smoothing", "period", "radians_per_count", "lowest", "highest", NULL};
-    double kp, kd, smoothing, period, radians_per_count, lowest, highest;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "ddddddd", names, &kp, &kd, &smoothing, &period, &radians_per_count,
-                                     &lowest, &highest))
-        return -1;
-    self->servo = servo_of(kp, kd, smoothing, period, radians_per_count, lowest, highest);
-    return 0;
-}
-
 static PyObject *Servo_step(Servo *self, PyObject *const *args, Py_ssize_t n)
 {
     long counts;
@@ -127,7 +99,7 @@ static PyTypeObject ServoType = {
     .tp_basicsize = sizeof(Servo),
     .tp_flags = Py_TPFLAGS_DEFAULT,
     .tp_new = PyType_GenericNew,
-    .tp_init = (initproc)Servo_init,
+    .tp_init = Servo_init,
     .tp_methods = Servo_methods,
 };
 

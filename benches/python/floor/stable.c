@@ -5,40 +5,11 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-#include "servo.h"
-
-typedef struct {
-    PyObject_HEAD
-    double position_counts, velocity_rad_s, acceleration_rad_s2;
-} Target;
-
-static int Target_init(PyObject *of, PyObject *args, PyObject *kwargs)
-{
-    static char *names[] = {"position_counts", "velocity_rad_s", "acceleration_rad_s2", NULL};
-    Target *self = (Target *)of;
-    return PyArg_ParseTupleAndKeywords(args, kwargs, "d|dd", names, &self->position_counts,
-                                       &self->velocity_rad_s, &self->acceleration_rad_s2) ? 0 : -1;
-}
+#include "types.h"
 
 static PyType_Slot Target_slots[] = {{Py_tp_init, Target_init}, {0, NULL}};
 static PyType_Spec Target_spec = {"stable.Target", sizeof(Target), 0, Py_TPFLAGS_DEFAULT, Target_slots};
 static PyTypeObject *TargetType;
-
-typedef struct {
-    PyObject_HEAD
-    servo servo;
-} Servo;
-
-static int Servo_init(PyObject *of, PyObject *args, PyObject *kwargs)
-{
-    static char *names[] = {"kp", "kd", "smoothing", "period", "radians_per_count", "lowest", "highest", NULL};
-    double kp, kd, smoothing, period, radians_per_count, lowest, highest;
-    if (!PyArg_ParseTupleAndKeywords(args, kwargs, "ddddddd", names, &kp, &kd, &smoothing, &period, &radians_per_count,
-                                     &lowest, &highest))
-        return -1;
-    ((Servo *)of)->servo = servo_of(kp, kd, smoothing, period, radians_per_count, lowest, highest);
-    return 0;
-}
 
 /* The arguments where some have names; 0, with an exception, if they are others than counts and target. */
 static int named(PyObject *const *args, Py_ssize_t n, PyObject *names, PyObject **given)

@@ -39,22 +39,7 @@ const BRAKE: Machine = Machine {
 /// The motor axis of the table `motor`, with a Stribeck velocity of 0.003 rad/s.
 const MOTOR: Machine = Machine {
     motor: true,
-    rig: r#"
-[rig]
-base = "bench"
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-drive.table = { points_s_nm = [[0.0, 0.0]] }
-
-[model]
-drive_torque_nm = 0.0
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-
-[output]
-lowest_v = -10.0
-on_invalid_v = 0.0
-"#,
+    rig: include_str!("../../clutch-sim/examples/smooth/motor_axis.toml"),
     rates: &[1.0, 2.0, 4.0],
     learnt_at: &[(2.0, 16.0), (4.0, 16.0)],
 };

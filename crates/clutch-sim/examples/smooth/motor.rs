@@ -17,22 +17,7 @@ pub(super) struct Axis {
 }
 
 /// A geared axis: 50 and 30 mN m of friction, no load.
-const AXIS: &str = r#"
-[rig]
-base = "bench"
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-drive.table = { points_s_nm = [[0.0, 0.0]] }
-
-[model]
-drive_torque_nm = 0.0
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-
-[output]
-lowest_v = -10.0
-on_invalid_v = 0.0
-"#;
+const AXIS: &str = include_str!("motor_axis.toml");
 
 /// The Stribeck velocity of the model above, rad/s.
 const BELIEVED: f64 = 0.003;
