@@ -191,7 +191,8 @@ pub(crate) struct Sampled<V> {
     variation: V,
     voltage: V,
     velocities: [V; 2],
-    jerk_square: V,
+    /// Of second differences of the velocity.
+    second_square: V,
 }
 
 impl<V: Arithmetic> Sampled<V> {
@@ -208,7 +209,7 @@ impl<V: Arithmetic> Sampled<V> {
             variation: zero,
             voltage: zero,
             velocities: [zero; 2],
-            jerk_square: zero,
+            second_square: zero,
         }
     }
 
@@ -219,7 +220,7 @@ impl<V: Arithmetic> Sampled<V> {
             return;
         }
         let magnitude = error.abs();
-        self.max = self.max.max(magnitude);
+        self.max = V::select(self.max.less(magnitude), magnitude, self.max);
         self.sum = self.sum + error;
         self.square = self.square + error * error;
         self.absolute = self.absolute + magnitude;
@@ -229,8 +230,7 @@ impl<V: Arithmetic> Sampled<V> {
         self.voltage = voltage;
         if self.samples >= 2 {
             let second = velocity - V::splat(2.0) * self.velocities[1] + self.velocities[0];
-            let jerk = second / V::splat(self.period * self.period);
-            self.jerk_square = self.jerk_square + jerk * jerk;
+            self.second_square = self.second_square + second * second;
         }
         self.velocities = [self.velocities[1], velocity];
         self.samples += 1;
@@ -251,7 +251,7 @@ impl<V: Lane> Sampled<V> {
             variation: self.variation.lane(i),
             voltage: self.voltage.lane(i),
             velocities: self.velocities.map(|v| v.lane(i)),
-            jerk_square: self.jerk_square.lane(i),
+            second_square: self.second_square.lane(i),
         }
     }
 }
@@ -388,7 +388,7 @@ impl MetricsBuilder {
             stair_height_rad: of.stair,
             break_away_torque_nm: (of.break_aways > 0).then(|| of.break_away_sum / of.break_aways as f64),
             control_variation_v_s: s.variation / time,
-            jerk_rms_rad_s3: libm::sqrt(s.jerk_square / (n - 2.0).max(1.0)),
+            jerk_rms_rad_s3: libm::sqrt(s.second_square / (n - 2.0).max(1.0)) / (s.period * s.period),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Exponential, logarithm, sine and cosine in lanes, with the bits of `libm`, on whose scalars all results rest.
+//! Exponential, logarithm, sine and cosine in lanes, with the bits of `libm`, on whose scalars all results rest; and `near_`
+//! functions, which are quicker, of one number and of many by the same steps.
 //!
 //! The way is that of Sun Microsystems' fdlibm (1993), as `libm` and musl have it: reduce the argument by multiples of ln 2
 //! or of π/2, a polynomial, and scale. A scalar branches; here both sides are computed and one is selected. Coefficients and the order
@@ -21,10 +22,16 @@ const P: [f64; 5] = [
     4.138_136_797_057_238_5e-8,
 ];
 
-/// Access to the bits of a number, as exponentials and logarithms need it.
-pub(crate) trait Powers: Lane {
+/// Access to the exponent of a number, as exponentials and logarithms need it.
+pub(crate) trait Scaled: Lane {
     /// 2 to the power of a whole number from −1022 to 1023.
     fn power_of_two(self) -> Self;
+    /// Exponent and mantissa of a positive normal number, the mantissa between the square roots of 1/2 and of 2.
+    fn split(self) -> (Self, Self);
+}
+
+/// Access to the bits of a number, as functions with the bits of `libm` need it.
+pub(crate) trait Powers: Scaled {
     /// Whole part, towards 0.
     fn trunc(self) -> Self;
     /// The power of two at or below a magnitude; 0 of 0.
@@ -33,8 +40,6 @@ pub(crate) trait Powers: Lane {
     fn upper(self) -> Self;
     /// A number from 1/2 to 2, and 1 more, to the digits of the upper half of its bits.
     fn upper_sum(self) -> Self;
-    /// Exponent and mantissa of a positive normal number, the mantissa between the square roots of 1/2 and of 2.
-    fn split(self) -> (Self, Self);
 }
 
 /// The multiple of ln 2 that an argument is reduced by, and what is left in two parts.
@@ -60,52 +65,7 @@ pub(crate) fn exp<V: Powers>(x: V) -> V {
 }
 
 #[inline(always)]
-pub(crate) fn expm1<V: Powers>(x: V) -> V {
-    const Q: [f64; 5] = [
-        -3.333_333_333_333_313e-2,
-        1.587_301_587_254_814_6e-3,
-        -7.936_507_578_674_88e-5,
-        4.008_217_827_329_362e-6,
-        -2.010_992_181_836_243_7e-7,
-    ];
-    let (one, half) = (V::ONE, V::splat(0.5));
-    let q = |i: usize| V::splat(Q[i]);
-    let (k, hi, lo) = reduced(x);
-    let r = hi - lo;
-    let c = (hi - r) - lo;
-    let hfx = half * r;
-    let hxs = r * hfx;
-    let r1 = one + hxs * (q(0) + hxs * (q(1) + hxs * (q(2) + hxs * (q(3) + hxs * q(4)))));
-    let t = V::splat(3.0) - r1 * hfx;
-    let e = hxs * ((r1 - t) / (V::splat(6.0) - r * t));
-    let unreduced = k.less(half) & (-half).less(k);
-    let near = r - (r * e - hxs);
-    let near = V::select(x.abs().less(V::splat(f64::from_bits(0x3c90_0000_0000_0000))), x, near);
-    if V::all(unreduced) {
-        return near;
-    }
-    let e = r * (e - c) - c;
-    let e = e - hxs;
-    let below = half * (r - e) - half;
-    let above =
-        V::select(r.less(V::splat(-0.25)), V::splat(-2.0) * (e - (r + half)), one + V::splat(2.0) * (r - e));
-    let power = k.power_of_two();
-    let inverse = (-k).power_of_two();
-    let far = (r - e + one) * power - one;
-    let small = (r - e + (one - inverse)) * power;
-    let large = (r - (e + inverse) + one) * power;
-    let y = V::select(k.less(V::splat(19.5)), small, large);
-    let y = V::select(k.less(V::ZERO) | V::splat(56.5).less(k), far, y);
-    let y = V::select(k.less(V::splat(1.5)) & half.less(k), above, y);
-    let y = V::select(k.less(-half) & V::splat(-1.5).less(k), below, y);
-    let y = V::select(unreduced, near, y);
-    // −56 ln 2 and less, in its upper word.
-    V::select(x.less_or_equal(V::splat(f64::from_bits(0xc043_687a_0000_0000))), -one, y)
-}
-
-/// `log(1 + f)` less `f − f²/2`, over `s` that stands beside `f²/2`: the polynomial of both logarithms.
-#[inline(always)]
-fn series<V: Powers>(f: V) -> (V, V, V) {
+pub(crate) fn log<V: Powers>(x: V) -> V {
     const LG: [f64; 7] = [
         6.666_666_666_666_735e-1,
         3.999_999_999_940_942e-1,
@@ -116,36 +76,80 @@ fn series<V: Powers>(f: V) -> (V, V, V) {
         1.479_819_860_511_658_6e-1,
     ];
     let lg = |i: usize| V::splat(LG[i]);
+    let (k, m) = x.split();
+    let f = m - V::ONE;
     let hfsq = V::splat(0.5) * f * f;
     let s = f / (V::splat(2.0) + f);
     let z = s * s;
     let w = z * z;
     let t1 = w * (lg(1) + w * (lg(3) + w * lg(5)));
     let t2 = z * (lg(0) + w * (lg(2) + w * (lg(4) + w * lg(6))));
-    (hfsq, s, t2 + t1)
+    s * (hfsq + (t2 + t1)) + k * V::splat(LN2_LO) - hfsq + f + k * V::splat(LN2_HI)
 }
 
+/// `e^x` in two parts, a power of two and that times `e^r − 1` with |r| ≤ ln(2)/2, for |x| ≤ 700; neither has `libm`'s last bit.
 #[inline(always)]
-pub(crate) fn log<V: Powers>(x: V) -> V {
-    let (k, m) = x.split();
-    let f = m - V::ONE;
-    let (hfsq, s, r) = series(f);
-    s * (hfsq + r) + k * V::splat(LN2_LO) - hfsq + f + k * V::splat(LN2_HI)
+fn near_power<V: Scaled>(x: V) -> (V, V) {
+    let s = V::splat;
+    // 1.5·2⁵² and a number is 1.5·2⁵² and the nearest whole one.
+    let rounding = s(1.5 / f64::EPSILON);
+    let n = (x * s(INVERSE_LN2) + rounding) - rounding;
+    let r = x - n * s(core::f64::consts::LN_2);
+    // Σ r^i/(i+2)!
+    const FACTORIALS: [f64; 10] = [
+        1.0 / 2.0,
+        1.0 / 6.0,
+        1.0 / 24.0,
+        1.0 / 120.0,
+        1.0 / 720.0,
+        1.0 / 5_040.0,
+        1.0 / 40_320.0,
+        1.0 / 362_880.0,
+        1.0 / 3_628_800.0,
+        1.0 / 39_916_800.0,
+    ];
+    let c = |i: usize| s(FACTORIALS[i]);
+    let r2 = r * r;
+    let r4 = r2 * r2;
+    let low = (c(0) + c(1) * r) + (c(2) + c(3) * r) * r2;
+    let high = (c(4) + c(5) * r) + (c(6) + c(7) * r) * r2;
+    let part = r + r2 * (low + r4 * (high + r4 * (c(8) + c(9) * r)));
+    let scale = n.power_of_two();
+    (scale, part * scale)
 }
 
+/// `e^x` to 3e-14 of it, for |x| ≤ 700.
 #[inline(always)]
-pub(crate) fn log1p<V: Powers>(x: V) -> V {
-    let unreduced = V::splat(-f64::from_bits(0x3fd2_bec5_0000_0000)).less(x)
-        & x.less(V::splat(f64::from_bits(0x3fda_827a_0000_0000)));
-    let u = V::ONE + x;
-    let (k, m) = u.split();
-    let c = V::select(V::splat(1.5).less(k), V::ONE - (u - x), x - (u - V::ONE)) / u;
-    let c = V::select(k.less(V::splat(53.5)), c, V::ZERO);
-    let (k, c) = (V::select(unreduced, V::ZERO, k), V::select(unreduced, V::ZERO, c));
-    let f = V::select(unreduced, x, m - V::ONE);
-    let (hfsq, s, r) = series(f);
-    let y = s * (hfsq + r) + (k * V::splat(LN2_LO) + c) - hfsq + f + k * V::splat(LN2_HI);
-    V::select(x.abs().less(V::splat(f64::from_bits(0x3ca0_0000_0000_0000))), x, y)
+pub(crate) fn near_exp<V: Scaled>(x: V) -> V {
+    let (scale, part) = near_power(x);
+    part + scale
+}
+
+/// `e^x − 1` to 3e-14 of it, for |x| ≤ 700.
+#[inline(always)]
+pub(crate) fn near_expm1<V: Scaled>(x: V) -> V {
+    let (scale, part) = near_power(x);
+    part + (scale - V::ONE)
+}
+
+/// `log(1 + x)` without `libm`'s last bit: to 3e-14 of it, for x > −1.
+#[inline(always)]
+pub(crate) fn near_log1p<V: Scaled>(x: V) -> V {
+    let s = V::splat;
+    // Where 1 + x is not reduced its rounding would count.
+    let near = s(-0.29).less(x) & x.less(s(0.41));
+    let (n, m) = (x + V::ONE).split();
+    let r = V::select(near, x, m - V::ONE);
+    let q = r / (r + s(2.0));
+    let z = q * q;
+    let z2 = z * z;
+    let z4 = z2 * z2;
+    // 2 artanh q = 2 Σ q^(2i+1)/(2i+1)
+    let c = |i: i32| s(2.0 / f64::from(2 * i + 1));
+    let low = (c(0) + c(1) * z) + (c(2) + c(3) * z) * z2;
+    let high = (c(4) + c(5) * z) + (c(6) + c(7) * z) * z2;
+    let sum = low + z4 * (high + z4 * (c(8) + c(9) * z));
+    q * sum + n * s(core::f64::consts::LN_2)
 }
 
 /// True where [`pow`] is for these numbers: positive and normal, no power that a scalar takes another way, and a result far

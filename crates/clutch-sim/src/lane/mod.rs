@@ -13,8 +13,6 @@ pub(crate) const MOST_LANES: usize = 8;
 pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     /// Lanes, at most [`MOST_LANES`].
     const WIDTH: usize;
-    /// Magnitude of what asks an exponential, beyond which a motion goes on alone; 100 below where exponentials end here.
-    const EXPONENT: f64;
 
     /// Does some work in a function of its own, by the same instructions: code that many call is there once.
     fn apart<R>(work: impl FnOnce() -> R) -> R;
@@ -24,6 +22,8 @@ pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     fn lane(&self, i: usize) -> f64;
     /// Puts a number into a lane.
     fn put(&mut self, i: usize, x: f64);
+    /// Puts all lanes into as many numbers.
+    fn store(self, to: &mut [f64]);
     /// True if the mask is true in a lane.
     fn any(mask: Self::Mask) -> bool;
     /// The mask, lane `i` in bit `i`.
@@ -42,12 +42,14 @@ pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     fn floor(self) -> Self;
     /// e to the power of self, for |self| ≤ 700.
     fn exp(self) -> Self;
-    /// e to the power of self, less 1, for |self| ≤ 700.
-    fn expm1(self) -> Self;
     /// Natural logarithm of a positive normal number.
     fn log(self) -> Self;
-    /// Natural logarithm of 1 + self, for self > −1.
-    fn log1p(self) -> Self;
+    /// e to the power of self, to 3e-14 of it, for |self| ≤ 700.
+    fn near_exp(self) -> Self;
+    /// e to the power of self, less 1, to 3e-14 of it, for |self| ≤ 700.
+    fn near_expm1(self) -> Self;
+    /// Natural logarithm of 1 + self, to 3e-14 of it, for self > −1.
+    fn near_log1p(self) -> Self;
     /// Sine.
     #[inline(always)]
     fn sin(self) -> Self {
@@ -55,21 +57,13 @@ pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     }
     /// Sine and cosine.
     fn sincos(self) -> (Self, Self);
-    /// e to the power of each.
+    /// e to the power of minus each, less 1, as [`Lane::near_expm1`] has it.
     #[inline(always)]
-    fn exp_of_each<const N: usize>(all: [Self; N]) -> [Self; N] {
-        all.map(
-            #[inline(always)]
-            |x| x.exp(),
-        )
-    }
-    /// e to the power of each, less 1.
-    #[inline(always)]
-    fn expm1_of_each<const N: usize>(all: [Self; N]) -> [Self; N] {
-        all.map(
-            #[inline(always)]
-            |x| x.expm1(),
-        )
+    fn near_falls<const N: usize>(mut all: [Self; N]) -> [Self; N] {
+        for x in &mut all {
+            *x = (-*x).near_expm1();
+        }
+        all
     }
 }
 

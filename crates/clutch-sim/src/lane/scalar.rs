@@ -2,7 +2,7 @@
 //! of `libm`.
 
 use super::Lane;
-use super::elementary::Powers;
+use super::elementary::{self, Powers, Scaled};
 use super::vector::{InLanes, at};
 use fearless_simd::Level;
 use std::sync::LazyLock;
@@ -19,7 +19,6 @@ macro_rules! libm {
 
 impl Lane for f64 {
     const WIDTH: usize = 1;
-    const EXPONENT: f64 = f64::INFINITY;
 
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
@@ -38,6 +37,10 @@ impl Lane for f64 {
         *self = x;
     }
     #[inline]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self;
+    }
+    #[inline]
     fn any(mask: bool) -> bool {
         mask
     }
@@ -50,51 +53,39 @@ impl Lane for f64 {
         libm::sincos(self)
     }
     #[inline]
-    fn exp_of_each<const N: usize>(all: [f64; N]) -> [f64; N] {
-        of_each(Function::Exp, all)
+    fn near_exp(self) -> f64 {
+        elementary::near_exp(self)
     }
     #[inline]
-    fn expm1_of_each<const N: usize>(all: [f64; N]) -> [f64; N] {
-        of_each(Function::Expm1, all)
+    fn near_expm1(self) -> f64 {
+        elementary::near_expm1(self)
     }
-    libm! { floor exp expm1 log log1p sin }
+    #[inline]
+    fn near_log1p(self) -> f64 {
+        elementary::near_log1p(self)
+    }
+    #[inline]
+    fn near_falls<const N: usize>(all: [f64; N]) -> [f64; N] {
+        at(*LEVEL, Falls(all)).unwrap_or_else(|| all.map(|x| (-x).near_expm1()))
+    }
+    libm! { floor exp log sin }
 }
 
 /// The processor's set of instructions, asked once.
 static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
-#[derive(Clone, Copy)]
-enum Function {
-    Exp,
-    Expm1,
-}
+/// [`Lane::near_falls`].
+struct Falls<const N: usize>([f64; N]);
 
-/// A function of several numbers.
-struct OfEach<const N: usize>(Function, [f64; N]);
-
-fn of_each<const N: usize>(function: Function, all: [f64; N]) -> [f64; N] {
-    let together = (N > 1).then(|| at(*LEVEL, OfEach(function, all))).flatten();
-    together.unwrap_or_else(|| {
-        all.map(|x| match function {
-            Function::Exp => libm::exp(x),
-            Function::Expm1 => libm::expm1(x),
-        })
-    })
-}
-
-impl<const N: usize> InLanes for OfEach<N> {
+impl<const N: usize> InLanes for Falls<N> {
     type Output = [f64; N];
 
     #[inline(always)]
     fn run<V: Powers>(self) -> [f64; N] {
-        let OfEach(function, mut all) = self;
+        let Falls(mut all) = self;
         for some in all.chunks_mut(V::WIDTH) {
             let last = some.len() - 1;
-            let x = V::of(|i| some[i.min(last)]);
-            let y = match function {
-                Function::Exp => x.exp(),
-                Function::Expm1 => x.expm1(),
-            };
+            let y = (-V::of(|i| some[i.min(last)])).near_expm1();
             for (i, to) in some.iter_mut().enumerate() {
                 *to = y.lane(i);
             }
@@ -103,23 +94,31 @@ impl<const N: usize> InLanes for OfEach<N> {
     }
 }
 
+impl Scaled for f64 {
+    #[inline]
+    fn power_of_two(self) -> f64 {
+        f64::from_bits(((self + (4_503_599_627_370_496.0 + 1023.0)).to_bits()) << 52)
+    }
+    #[inline]
+    fn split(self) -> (f64, f64) {
+        let moved = self.to_bits().wrapping_add((0x3ff0_0000 - 0x3fe6_a09e) << 32);
+        let mantissa = (moved & 0x000f_ffff_ffff_ffff) + (0x3fe6_a09e << 32);
+        let exponent = f64::from_bits((moved >> 52) | (0x4330_0000 << 32));
+        (exponent - (4_503_599_627_370_496.0 + 1023.0), f64::from_bits(mantissa))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn one_number_and_many_have_the_bits_of_libm() {
-        let numbers = |seed: usize| -> [f64; 8] {
-            std::array::from_fn(|i| ((seed * 8 + i) as f64 * 0.618).fract() * 12.0 - 6.0)
-        };
+    fn one_number_and_many_have_the_same_bits() {
         for seed in 0..if cfg!(miri) { 2 } else { 20_000 } {
-            let all = numbers(seed);
-            let bits = |of: [f64; 8]| of.map(f64::to_bits);
-            assert_eq!(bits(f64::exp_of_each(all)), bits(all.map(libm::exp)), "{all:?}");
-            assert_eq!(bits(f64::expm1_of_each(all)), bits(all.map(libm::expm1)), "{all:?}");
-            let [first, ..] = all;
-            assert_eq!(f64::exp_of_each([first])[0].to_bits(), libm::exp(first).to_bits(), "{first:?}");
-            assert_eq!(f64::expm1_of_each([first])[0].to_bits(), libm::expm1(first).to_bits(), "{first:?}");
+            let all: [f64; 13] =
+                std::array::from_fn(|i| (f64::from(seed * 13 + i as i32) * 0.618).fract() * 12.0 - 6.0);
+            let (one_by_one, together) = (all.map(|x| (-x).near_expm1()), f64::near_falls(all));
+            assert_eq!(together.map(f64::to_bits), one_by_one.map(f64::to_bits), "{all:?}");
         }
     }
 }

@@ -7,7 +7,7 @@
 //! of this file can name a vector, and [`InLanes`] is given one by [`at`] alone. Its result may hold vectors for later – the
 //! processor stays the one that it is –, but where they are used only [`Lane::apart`] brings their instructions back.
 
-use super::elementary::{self, Powers};
+use super::elementary::{self, Powers, Scaled};
 use crate::lane::{Lane, MOST_LANES};
 use clutch_core::Arithmetic;
 use clutch_core::law::Limit;
@@ -253,7 +253,6 @@ macro_rules! elementary {
 
 impl<S: Instructions> Lane for Vector<S> {
     const WIDTH: usize = S::f64s::LEN;
-    const EXPONENT: f64 = 600.0;
 
     #[inline(always)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
@@ -274,6 +273,10 @@ impl<S: Instructions> Lane for Vector<S> {
     #[inline(always)]
     fn put(&mut self, i: usize, x: f64) {
         self.0[i] = x;
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        self.0.store_slice(to);
     }
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {
@@ -301,16 +304,41 @@ impl<S: Instructions> Lane for Vector<S> {
         }
         (Self::of(|i| libm::sincos(self.lane(i)).0), Self::of(|i| libm::sincos(self.lane(i)).1))
     }
-    elementary! { exp expm1 log log1p }
+    elementary! { exp log }
+    #[inline(always)]
+    fn near_exp(self) -> Self {
+        elementary::near_exp(self)
+    }
+    #[inline(always)]
+    fn near_expm1(self) -> Self {
+        elementary::near_expm1(self)
+    }
+    #[inline(always)]
+    fn near_log1p(self) -> Self {
+        elementary::near_log1p(self)
+    }
 }
 
-impl<S: Instructions> Powers for Vector<S> {
+impl<S: Instructions> Scaled for Vector<S> {
     #[inline(always)]
     fn power_of_two(self) -> Self {
         // 2⁵² + n has n in its low bits.
         let biased = (self + Self::splat(4_503_599_627_370_496.0 + 1023.0)).0.bitcast::<S::u64s>();
         Vector((biased << 52).bitcast())
     }
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        let word = |upper: u64| S::u64s::splat(S::TOKEN, upper << 32);
+        let moved = self.0.bitcast::<S::u64s>() + word(0x3ff0_0000 - 0x3fe6_a09e);
+        let mantissa = (moved & S::u64s::splat(S::TOKEN, 0x000f_ffff_ffff_ffff)) + word(0x3fe6_a09e);
+        // As above, the other way round.
+        let exponent = (moved >> 52) | word(0x4330_0000);
+        let exponent = Vector(exponent.bitcast()) - Self::splat(4_503_599_627_370_496.0 + 1023.0);
+        (exponent, Vector(mantissa.bitcast()))
+    }
+}
+
+impl<S: Instructions> Powers for Vector<S> {
     #[inline(always)]
     fn trunc(self) -> Self {
         Vector(self.0.trunc())
@@ -331,15 +359,5 @@ impl<S: Instructions> Powers for Vector<S> {
         let word = |upper: u64| S::u64s::splat(S::TOKEN, upper << 32);
         let half = (self.0.bitcast::<S::u64s>() >> 1) & word(0xffff_ffff);
         Vector(((half | word(0x2000_0000)) + word(0x0008_0000)).bitcast())
-    }
-    #[inline(always)]
-    fn split(self) -> (Self, Self) {
-        let word = |upper: u64| S::u64s::splat(S::TOKEN, upper << 32);
-        let moved = self.0.bitcast::<S::u64s>() + word(0x3ff0_0000 - 0x3fe6_a09e);
-        let mantissa = (moved & S::u64s::splat(S::TOKEN, 0x000f_ffff_ffff_ffff)) + word(0x3fe6_a09e);
-        // As above, the other way round.
-        let exponent = (moved >> 52) | word(0x4330_0000);
-        let exponent = Vector(exponent.bitcast()) - Self::splat(4_503_599_627_370_496.0 + 1023.0);
-        (exponent, Vector(mantissa.bitcast()))
     }
 }

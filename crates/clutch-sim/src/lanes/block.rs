@@ -4,7 +4,7 @@ use super::candidate::{Candidate, Common};
 use super::motion::Motions;
 use super::servo::{FIXED, Sensors, Servos, Targets, beyond};
 use super::shafts::Shafts;
-use super::silence::Silence;
+use super::silence::Silences;
 use crate::detected::STAIR;
 use crate::lane::elementary::Powers;
 use crate::lane::vector::InLanes;
@@ -34,8 +34,8 @@ struct Chunk<'a, V: Lane> {
     counts: V,
     // Results.
     sampled: Sampled<V>,
-    silences: Silence<V>,
-    stairs: Silence<V>,
+    /// Of stick-slip, and stairs.
+    silences: Silences<V, 2>,
 }
 
 /// Figures of a run; none if it left what lanes can do.
@@ -119,8 +119,10 @@ impl<'a, V: Lane> Chunk<'a, V> {
             radians_per_count: V::of(|i| row(i).steered.servo.encoder().radians_per_count()),
             counts: V::ZERO,
             sampled: Sampled::new(period, common.settle),
-            silences: Silence::new(&StickSlipParams::default(), counts_per_radian * V::splat(period)),
-            stairs: Silence::new(&STAIR, counts_per_radian * V::splat(period)),
+            silences: Silences::new(
+                [&StickSlipParams::default(), &STAIR],
+                counts_per_radian * V::splat(period),
+            ),
         };
         let targets = chunk.targets(0, None);
         let (_, seen) = chunk.sensors.read(shafts.position);
@@ -161,7 +163,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
     ) {
         let targets = self.targets(k, shared);
         let (counts, seen) = self.sensors.read(shafts.position);
-        shafts.lost |= beyond(counts, targets.position);
+        shafts.lost |= beyond(seen, targets.position);
         let (_, commanded) = self.servos.sample(shafts.lost, seen, &targets);
         let target = targets.position * V::splat(1.0 / FIXED) * self.radians_per_count;
         self.sampled.sample(time, target - shafts.position, shafts.velocity, commanded);
@@ -169,7 +171,6 @@ impl<'a, V: Lane> Chunk<'a, V> {
         self.counts = counts;
         let settled = time >= common.settle;
         self.silences.update(!rests, targets.velocity, settled);
-        self.stairs.update(!rests, targets.velocity, settled);
         shafts.command(commanded);
     }
 
@@ -181,11 +182,11 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let sticks = shafts.sticks[i].clone();
         let metrics = MetricsBuilder::of(self.sampled.lane(i), sticks).finish();
         let time = metrics.measured_s.max(common.motion.period);
-        let (cycles, stuck_ticks) = self.silences.since_settled(i);
+        let [(cycles, stuck_ticks), (stairs, _)] = self.silences.since_settled(i);
         let detected = Detected {
             stick_slip_cycles_per_s: cycles / time,
             stick_time_fraction: stuck_ticks * common.motion.period / time,
-            stairs_per_s: self.stairs.since_settled(i).0 / time,
+            stairs_per_s: stairs / time,
             ..Detected::default()
         };
         Some((metrics, detected))

@@ -139,8 +139,8 @@ impl<V: Lane> Together for Group<V> {
                 for (n, some) in targets.chunks(V::WIDTH).enumerate() {
                     let (shafts, targets) = (&mut motions.shafts[n], Targets::of(some));
                     let first = n * V::WIDTH;
-                    let (counts, seen) = sensors.read(shafts.position);
-                    shafts.lost |= beyond(counts, targets.position);
+                    let (_, seen) = sensors.read(shafts.position);
+                    shafts.lost |= beyond(seen, targets.position);
                     tell(told, first, Quantity::Position, shafts.position);
                     tell(told, first, Quantity::Velocity, shafts.velocity);
                     // A count of −0 is 0.

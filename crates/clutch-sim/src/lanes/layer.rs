@@ -5,7 +5,7 @@ use super::alike::Alike;
 use super::shafts::{Moves, Shafts};
 use crate::engine::exact_flow::{Flow, PIECE_LIMIT, Piece, Pushed, State};
 use crate::engine::{Event, EventKind, Motion, Shaft};
-use crate::lane::{Lane, each};
+use crate::lane::{Lane, MOST_LANES, each};
 
 /// A period of the shafts in the lanes of one vector.
 #[derive(Clone, Copy)]
@@ -18,199 +18,208 @@ pub(super) struct Period<V: Lane> {
     pub(super) breaks_away: u64,
 }
 
-/// Motions on their way through a period, column by column.
-struct Queue {
-    many: usize,
-    /// Their vectors' places and their lanes.
-    places: Vec<(usize, usize)>,
-    /// Time, speed, `φ`, way, and `q`, as [`State`] has them; `φ` and `q` where they are known.
-    columns: [Vec<f64>; 5],
+/// Motions of the lanes of one vector: a row for each number, with a place for each lane.
+#[derive(Clone, Copy, Default)]
+struct Rows {
+    /// As [`Flow`] has them: drive, excess, drag, Stribeck's term, edge.
+    flow: [[f64; MOST_LANES]; 5],
+    /// As [`State`] has them: time, speed, `φ`, way.
+    state: [[f64; MOST_LANES]; 4],
 }
 
-impl Queue {
-    /// Room for so many.
-    fn of(many: usize) -> Self {
-        Queue { many: 0, places: vec![(0, 0); many], columns: std::array::from_fn(|_| vec![0.0; many]) }
-    }
-
-    fn put(&mut self, place: (usize, usize), at: &State<f64>, slip: f64) {
-        let State { time, speed, rate, way } = *at;
-        self.places[self.many] = place;
-        for (column, x) in self.columns.iter_mut().zip([time, speed, rate, way, slip]) {
-            column[self.many] = x;
+impl Rows {
+    /// The constants of a motion.
+    fn flow(&self, lane: usize) -> Flow<f64> {
+        let [drive, excess, drag, stribeck, edge] = &self.flow;
+        Flow {
+            drive: drive[lane],
+            excess: excess[lane],
+            drag: drag[lane],
+            stribeck: stribeck[lane],
+            edge: edge[lane],
         }
-        self.many += 1;
     }
 
-    /// Some of them, from this one on, in the lanes of a vector; in lanes that are left over the last.
+    /// A motion goes on from a state.
     #[inline(always)]
-    fn gather<V: Lane>(&self, first: usize, flows: &[Flow<f64>]) -> (Flow<V>, State<V>, V) {
-        let last = self.many - 1;
-        let [time, speed, rate, way, slip] = &self.columns;
-        let column = |column: &[f64]| match column.get(first..first + V::WIDTH) {
-            Some(all) if first + V::WIDTH <= self.many => V::of(|i| all[i]),
-            _ => V::of(|i| column[(first + i).min(last)]),
-        };
-        let flow = |get: fn(&Flow<f64>) -> f64| {
-            V::of(|i| {
-                let (shafts, lane) = self.places[(first + i).min(last)];
-                get(&flows[shafts * V::WIDTH + lane])
-            })
-        };
-        let flow = Flow {
-            drive: flow(|f| f.drive),
-            excess: flow(|f| f.excess),
-            unit: flow(|f| f.unit),
-            drag: flow(|f| f.drag),
-            stribeck: flow(|f| f.stribeck),
-            edge: flow(|f| f.edge),
-        };
-        let at = State { time: column(time), speed: column(speed), rate: column(rate), way: column(way) };
-        (flow, at, column(slip))
+    fn put(&mut self, lane: usize, state: &State<f64>) {
+        let [time, speed, rate, way] = &mut self.state;
+        (time[lane], speed[lane], rate[lane], way[lane]) = (state.time, state.speed, state.rate, state.way);
     }
+}
+
+/// A motion that waits: its vector, and its lane there.
+#[derive(Clone, Copy)]
+struct Place {
+    n: u32,
+    lane: u32,
+}
+
+impl Place {
+    #[inline(always)]
+    fn lane(self) -> usize {
+        self.lane as usize % MOST_LANES
+    }
+}
+
+/// Some motions, at most as many as a vector has lanes; in those that are left over the last.
+#[inline(always)]
+fn gather<V: Lane>(rows: &[Rows], some: &[Place]) -> (Flow<V>, State<V>) {
+    let mut of = [(&rows[0], 0); MOST_LANES];
+    for (i, of) in of.iter_mut().enumerate().take(V::WIDTH) {
+        let place = some[i.min(some.len() - 1)];
+        *of = (&rows[place.n as usize], place.lane());
+    }
+    let flow = |row: usize| V::of(|i| of[i].0.flow[row][of[i].1]);
+    let state = |row: usize| V::of(|i| of[i].0.state[row][of[i].1]);
+    let flow = Flow { drive: flow(0), excess: flow(1), drag: flow(2), stribeck: flow(3), edge: flow(4) };
+    (flow, State { time: state(0), speed: state(1), rate: state(2), way: state(3) })
 }
 
 /// The motions that wait, by the kind of piece that is next.
 pub(super) struct Layer<V: Lane> {
     /// Vector by vector.
     periods: Vec<Period<V>>,
-    /// Lane by lane of each vector: a motion reads all of one.
-    flows: Vec<Flow<f64>>,
+    rows: Vec<Rows>,
     /// Perhaps an easy one.
-    easy: Queue,
-    /// As `easy`, in the next round.
-    next: Queue,
+    easy: Vec<Place>,
     /// A quadrature, if its error is small enough.
-    inside: Queue,
-    /// A series.
-    steep: Queue,
+    inside: Vec<Place>,
+    /// As `inside`, in the next round.
+    next: Vec<Place>,
 }
 
 impl<V: Lane> Layer<V> {
     /// Room for the motions of so many vectors.
     pub(super) fn of(vectors: usize) -> Self {
         let zero = V::ZERO;
-        let flow = Flow { drive: 0.0, excess: 0.0, unit: 0.0, drag: 0.0, stribeck: 0.0, edge: 0.0 };
         let pushed = Pushed { torque: zero, normal: zero, holds: zero };
         let period = Period { pushed, sign: zero, way: zero, breaks_away: 0 };
-        let queue = || Queue::of(vectors * V::WIDTH);
+        let queue = || Vec::with_capacity(vectors * V::WIDTH);
         Layer {
             periods: vec![period; vectors],
-            flows: vec![flow; vectors * V::WIDTH],
+            rows: vec![Rows::default(); vectors],
             easy: queue(),
-            next: queue(),
             inside: queue(),
-            steep: queue(),
+            next: queue(),
         }
     }
 
     /// None waits.
     pub(super) fn is_empty(&self) -> bool {
-        self.easy.many + self.inside.many == 0
+        self.easy.is_empty() && self.inside.is_empty()
     }
 
-    /// Motions of a vector wait: some have a state after their first piece; those whose next piece is no easy one have `q`
-    /// and `φ`.
+    /// Some motions of a vector wait, at these speeds.
     #[inline(always)]
-    pub(super) fn wait(
-        &mut self,
-        n: usize,
-        (period, flow): (Period<V>, &Flow<V>),
-        (some, inside): (u64, u64),
-        (state, slip, rate): (&State<V>, V, V),
-    ) {
+    pub(super) fn wait(&mut self, n: usize, (period, flow): (Period<V>, &Flow<V>), some: u64, speed: V) {
         self.periods[n] = period;
-        each(some, |lane| self.flows[n * V::WIDTH + lane] = flow.lane(lane));
-        let known = State { rate, ..*state };
-        each(some & inside, |lane| self.inside.put((n, lane), &known.lane(lane), slip.lane(lane)));
-        each(some & !inside, |lane| self.easy.put((n, lane), &state.lane(lane), 0.0));
+        let rows = &mut self.rows[n];
+        let Flow { drive, excess, drag, stribeck, edge } = *flow;
+        for (row, x) in rows.flow.iter_mut().zip([drive, excess, drag, stribeck, edge]) {
+            x.store(&mut row[..V::WIDTH]);
+        }
+        let State { time, speed, rate, way } = State::at(speed);
+        for (row, x) in rows.state.iter_mut().zip([time, speed, rate, way]) {
+            x.store(&mut row[..V::WIDTH]);
+        }
+        let place = |lane: usize| Place { n: n as u32, lane: lane as u32 };
+        let slow = V::bits(flow.is_slow(speed));
+        each(some & slow, |lane| self.inside.push(place(lane)));
+        each(some & !slow, |lane| self.easy.push(place(lane)));
     }
 
     /// The period that began at `time` ends for all that wait.
     #[inline(always)]
     pub(super) fn end(&mut self, all: &mut [Shafts<V>], time: f64, alike: &Alike, events: &mut Vec<Event>) {
         let whole = V::splat(alike.period);
-        let Layer { periods, flows, easy, next, inside, steep } = self;
-        let mut after = After { all, flows, time, alike, events };
+        let Layer { periods, rows, easy, inside, next } = self;
+        let mut after = After { all, periods, time, alike, events };
         for _ in 0..PIECE_LIMIT {
-            if easy.many + inside.many == 0 {
+            if easy.is_empty() && inside.is_empty() {
                 return;
             }
-            for first in (0..easy.many).step_by(V::WIDTH) {
-                let (flow, at, _) = easy.gather(first, after.flows);
-                let (piece, slip, rate) = flow.easy(&at, whole - at.time);
-                let known = State { rate, ..at };
-                let on = |i: usize| (known.lane(i), slip.lane(i));
-                after.take(&piece, (whole, V::none()), (easy, first), periods, next, (inside, on));
+            // What is easy the next time, behind these.
+            let (first, mut begin) = (easy.len(), 0);
+            while begin < first {
+                let some: [Place; MOST_LANES] = places(&easy[begin..first]);
+                let some = &some[..(first - begin).min(V::WIDTH)];
+                let (flow, at) = gather::<V>(rows, some);
+                let piece = flow.easy(&at, whole - at.time);
+                let (goes_on, others) = after.take(&piece, whole, some, rows);
+                // What has come down from the edge is next to the layer; what has come down to the edge is above it.
+                let down = V::bits(!piece.state.speed.less(flow.edge));
+                each(goes_on & down, |i| easy.push(some[i]));
+                each(others | (goes_on & !down), |i| inside.push(some[i]));
+                begin += V::WIDTH;
             }
-            for first in (0..inside.many).step_by(V::WIDTH) {
-                let (flow, at, slip) = inside.gather(first, after.flows);
-                let (piece, room) = flow.inside(&at, (slip, at.rate), whole - at.time);
-                let on = |i: usize| (at.lane(i), slip.lane(i));
-                after.take(&piece, (whole, !room), (inside, first), periods, next, (steep, on));
+            easy.drain(..first);
+            for some in inside.chunks(V::WIDTH) {
+                let (flow, at) = gather::<V>(rows, some);
+                let rates = flow.rates(&at);
+                let piece = flow.inside(&at, rates, whole - at.time);
+                let (goes_on, others) = after.take(&piece, whole, some, rows);
+                let slow = V::bits(flow.is_slow(piece.state.speed));
+                each(goes_on & slow, |i| next.push(some[i]));
+                each(goes_on & !slow, |i| easy.push(some[i]));
+                // As a series, and as it goes on from there.
+                each(others, |i| after.alone(some[i], rows, (at.lane(i), false)));
             }
-            for first in (0..steep.many).step_by(V::WIDTH) {
-                let (flow, at, slip) = steep.gather(first, after.flows);
-                let piece = flow.steep(&at, (slip, at.rate), whole - at.time);
-                let on = |i: usize| (at.lane(i), slip.lane(i));
-                after.take(&piece, (whole, V::none()), (steep, first), periods, next, (inside, on));
-            }
-            (easy.many, inside.many, steep.many) = (0, 0, 0);
-            std::mem::swap(easy, next);
+            inside.clear();
+            std::mem::swap(inside, next);
         }
         // Alone they say so.
-        for queue in [easy, inside] {
-            let places = &queue.places[..std::mem::take(&mut queue.many)];
-            places.iter().for_each(|(shafts, lane)| after.all[*shafts].lost |= 1 << lane);
+        for Place { n, lane } in easy.drain(..).chain(inside.drain(..)) {
+            after.all[n as usize].lost |= 1 << lane;
         }
     }
+}
+
+/// The first of some places.
+#[inline(always)]
+fn places(some: &[Place]) -> [Place; MOST_LANES] {
+    let mut first = [some[0]; MOST_LANES];
+    for (to, place) in first.iter_mut().zip(some) {
+        *to = *place;
+    }
+    first
 }
 
 /// The needs of motions that end.
 struct After<'a, V: Lane> {
     all: &'a mut [Shafts<V>],
-    flows: &'a [Flow<f64>],
+    periods: &'a [Period<V>],
     time: f64,
     alike: &'a Alike,
     events: &'a mut Vec<Event>,
 }
 
 impl<V: Lane> After<'_, V> {
-    /// Motions of a queue, from `first` on, have made a piece: they end, or wait for the next round. Those that have not are put into another
-    /// queue, with the state and `q` that `on` gives, but for those that have to go alone.
+    /// Some motions have made a piece, and end if they have come to the end, or stopped. The bits of those that go on, and of those
+    /// that have made none.
     #[inline(always)]
-    fn take(
-        &mut self,
-        piece: &Piece<V>,
-        (whole, alone): (V, V::Mask),
-        (queue, first): (&Queue, usize),
-        periods: &[Period<V>],
-        next: &mut Queue,
-        (other, on): (&mut Queue, impl Fn(usize) -> (State<f64>, f64)),
-    ) {
+    fn take(&mut self, piece: &Piece<V>, whole: V, some: &[Place], rows: &mut [Rows]) -> (u64, u64) {
         let Piece { done, stops, state } = piece;
-        let finite = *done & state.speed.is_finite() & state.way.is_finite();
-        let goes_on = finite & !*stops;
-        let ends = V::bits(goes_on & whole.less_or_equal(state.time));
-        let (goes_on, on_to) = (V::bits(goes_on) & !ends, V::bits(!*done & !alone));
-        let stops = V::bits(finite & *stops);
-        for (i, place) in queue.places[first..queue.many].iter().take(V::WIDTH).enumerate() {
-            let is = |bits: u64| bits >> i & 1 == 1;
-            let (period, shafts) = (&periods[place.0], &mut self.all[place.0]);
-            if is(ends) {
-                shafts.ends(place.1, period, (state.speed.lane(i), state.way.lane(i)), self.time);
-            } else if is(goes_on) {
-                next.put(*place, &state.lane(i), 0.0);
-            } else if is(on_to) {
-                let (state, slip) = on(i);
-                other.put(*place, &state, slip);
-            } else {
-                let state = if is(V::bits(finite)) { state.lane(i) } else { on(i).0 };
-                let flow = self.flows[place.0 * V::WIDTH + place.1];
-                let begun = (flow, state, is(stops));
-                shafts.alone(place.1, period, begun, (self.time, self.alike), self.events);
-            }
-        }
+        let own = !u64::MAX.unbounded_shl(some.len() as u32);
+        let goes = *done & !*stops & state.speed.is_finite() & state.way.is_finite();
+        let ends = V::bits(goes & whole.less_or_equal(state.time)) & own;
+        each(ends, |i| {
+            let Place { n, .. } = some[i];
+            let (speed, way) = (state.speed.lane(i), state.way.lane(i));
+            self.all[n as usize].ends(some[i].lane(), &self.periods[n as usize], (speed, way), self.time);
+        });
+        let (goes, done) = (V::bits(goes) & own, V::bits(*done) & own);
+        each(goes & !ends, |i| rows[some[i].n as usize].put(some[i].lane(), &state.lane(i)));
+        let stops = V::bits(*stops);
+        each(done & !goes, |i| self.alone(some[i], rows, (state.lane(i), stops >> i & 1 == 1)));
+        (goes & !ends, own & !done)
+    }
+
+    /// A motion goes on alone from a state, or stops in it.
+    fn alone(&mut self, at: Place, rows: &[Rows], (state, stops): (State<f64>, bool)) {
+        let n = at.n as usize;
+        let begun = (rows[n].flow(at.lane()), state, stops);
+        self.all[n].alone(at.lane(), &self.periods[n], begun, (self.time, self.alike), self.events);
     }
 }
 

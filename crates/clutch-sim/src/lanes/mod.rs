@@ -23,6 +23,7 @@ mod group;
 mod in_steps;
 mod layer;
 mod motion;
+mod push;
 mod servo;
 mod shafts;
 mod silence;

@@ -6,7 +6,7 @@ use super::layer::{Layer, Period};
 use super::shafts::{Moves, Shafts};
 use super::steps::{Gathered, step_by_step};
 use crate::engine::Event;
-use crate::engine::exact_flow::{HIGHEST_EDGE, Pushed, State};
+use crate::engine::exact_flow::HIGHEST_EDGE;
 use crate::lane::{Lane, each};
 use crate::metrics::Sticks;
 
@@ -81,47 +81,35 @@ impl<V: Lane> Shafts<V> {
         layer: &mut Layer<V>,
         steps: &mut Vec<OnTheWay>,
     ) {
-        let Moves::Exactly { bed, .. } = &self.moves else {
+        let Moves::Exactly { bed, whole, .. } = &self.moves else {
             self.begin_steps(n, time, alike, steps);
             return;
         };
-        let (volts, rest) = (self.arriving, V::splat(alike.period));
-        let actuator = self.plant.actuator();
-        let pushed = Pushed {
-            torque: self.drive + actuator.torque(volts),
-            normal: actuator.normal(volts),
-            holds: self.plant.break_away_torque(volts),
-        };
-        let moves = self.sign.less(V::ZERO) | V::ZERO.less(self.sign);
-        let breaks_away = !moves & pushed.holds.less(pushed.torque.abs());
-        let stuck = !moves & !breaks_away;
-        if V::any(stuck) {
-            each(V::bits(stuck) & !self.lost, |i| self.sticks[i].period(time, true, &[]));
+        let pushed = self.push.at(self.arriving, self.drive, &self.plant);
+        let rests = V::same(self.sign, V::ZERO);
+        let (mut sign, mut breaks_away) = (self.sign, V::none());
+        let mut stuck = 0;
+        if V::any(rests) {
+            breaks_away = rests & pushed.holds.less(pushed.torque.abs());
+            stuck = V::bits(rests & !breaks_away);
+            each(stuck & !self.lost, |i| self.sticks[i].period(time, true, &[]));
+            sign = V::select(breaks_away, pushed.torque.sgn(), sign);
         }
-        if !V::any(!stuck) {
-            return;
-        }
-        let sign = V::select(breaks_away, pushed.torque.sgn(), self.sign);
-        let v_s = bed.velocity();
-        let begin = State::at(sign * self.velocity / v_s);
-        let flow = bed.flow(&pushed, sign, begin.speed, rest);
-        // Motions that no exponential here has room for.
-        self.lost |= V::bits(!flow.edge.less(V::splat(HIGHEST_EDGE)) & !stuck);
-        let (piece, slip, rate) = flow.easy(&begin, rest);
-        // Its stop is for what finds it.
-        let easy = piece.done;
-        let (done, state) = (easy & !piece.stops, State::select(piece.stops, &begin, &piece.state));
-        // To the end, and not to a stop.
-        let whole = rest.less_or_equal(state.time) & V::ZERO.less(state.speed);
-        let done = done & moves & whole & state.speed.is_finite() & state.way.is_finite();
-        let way = sign * v_s;
-        self.position = V::select(done, self.position + way * state.way, self.position);
-        self.velocity = V::select(done, way * state.speed, self.velocity);
-        let left = !stuck & !done;
-        if V::any(left) {
-            let left = (V::bits(left) & !self.lost, V::bits(!easy));
+        let rest = V::splat(alike.period);
+        let speed = bed.speed(sign * self.velocity);
+        let flow = bed.flow(&pushed, sign, rest);
+        // Most stay outside of the layer.
+        let (far, after, along) = flow.stays_outside(speed, rest, whole);
+        let done = far & !rests & (after + along).is_finite();
+        let way = sign * bed.velocity();
+        self.position = V::select(done, self.position + way * along, self.position);
+        self.velocity = V::select(done, way * after, self.velocity);
+        if !V::all(done) {
+            let waits = !(V::bits(done) | stuck | self.lost) & !u64::MAX.unbounded_shl(V::WIDTH as u32);
+            // Motions that no exponential here has room for.
+            self.lost |= waits & V::bits(!flow.edge.less(V::splat(HIGHEST_EDGE)));
             let period = Period { pushed, sign, way, breaks_away: V::bits(breaks_away) };
-            layer.wait(n, (period, &flow), left, (&state, slip, rate));
+            layer.wait(n, (period, &flow), waits & !self.lost, speed);
         }
     }
 }

@@ -48,10 +48,10 @@ macro_rules! laws {
 
             /// A period, with so many volts on the actuator since the last one.
             #[inline(always)]
-            fn update(&mut self, tick: &Tick<V>, applied: V) -> V {
+            fn update(&mut self, tick: &Tick<V>, applied: impl FnOnce() -> V) -> V {
                 match self {
                     $(LawInLanes::$law(law, state) => {
-                        law.sees(state, || Seen { applied, ..Seen::default() });
+                        law.sees(state, || Seen { applied: applied(), ..Seen::default() });
                         law.update(state, tick).voltage
                     })+
                 }
@@ -152,11 +152,11 @@ impl<V: Lane> Sensors<V> {
     }
 }
 
-/// Lanes whose counts or whose targets, in fixed point, are beyond what lanes do, or no number.
+/// Lanes whose positions or whose targets, both in fixed point, are together beyond what lanes do, or no number.
 #[inline(always)]
-pub(super) fn beyond<V: Lane>(counts: V, target: V) -> u64 {
-    let near = counts.abs().less(V::splat(FARTHEST)) & target.abs().less(V::splat(FARTHEST * FIXED));
-    V::bits(!near)
+pub(super) fn beyond<V: Lane>(seen: V, target: V) -> u64 {
+    let near = (seen.abs() + target.abs()).less(V::splat(FARTHEST * FIXED));
+    if V::all(near) { 0 } else { V::bits(!near) }
 }
 
 /// Servos of the shafts in the lanes of one vector.
@@ -204,8 +204,8 @@ pub(super) struct LaneServos<V: Lane> {
     /// Error of the last sample in fixed point, and its rate by (5).
     error: V,
     rate: V,
-    /// Voltage since the last sample, as the law is told.
-    applied: V,
+    /// Voltage since the last sample: the converter's, or the law's own.
+    last: V,
 }
 
 impl<V: Lane> LaneServos<V> {
@@ -230,7 +230,7 @@ impl<V: Lane> LaneServos<V> {
             law: LawInLanes::of(&all.iter().map(|one| one.servo.law()).collect::<Vec<_>>())?,
             error: V::ZERO,
             rate: V::ZERO,
-            applied: V::ZERO,
+            last: V::ZERO,
         })
     }
 
@@ -238,7 +238,7 @@ impl<V: Lane> LaneServos<V> {
     pub(super) fn start(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {
         self.error = V::select(which, targets.position - seen, self.error);
         self.rate = V::select(which, V::ZERO, self.rate);
-        self.applied = V::select(which, volts, self.applied);
+        self.last = V::select(which, volts, self.last);
         let tick = self.tick(targets);
         self.law.start(which, &tick, volts);
     }
@@ -261,13 +261,21 @@ impl<V: Lane> LaneServos<V> {
         self.error = error;
         self.rate = self.filter.smooth(self.rate, difference);
         let tick = self.tick(targets);
-        let demand = self.law.update(&tick, self.applied);
-        let [lowest, step, per_volt, top] = self.dac;
-        let code = ((demand - lowest) * per_volt + V::splat(0.5)).floor();
         // A law is told of the converter's voltage, though a rig's may round nothing.
-        self.applied = lowest + step * code.max(V::ZERO).min(top);
-        (tick, if self.whole_codes { self.applied } else { demand })
+        let (dac, last, rounded) = (&self.dac, self.last, self.whole_codes);
+        let applied = || if rounded { last } else { converted(dac, last) };
+        let demand = self.law.update(&tick, applied);
+        self.last = if rounded { converted(dac, demand) } else { demand };
+        (tick, self.last)
     }
+}
+
+/// The voltage of the nearest code.
+#[inline(always)]
+fn converted<V: Lane>([lowest, step, per_volt, top]: &[V; 4], demand: V) -> V {
+    let code = ((demand - *lowest) * *per_volt + V::splat(0.5)).floor();
+    let code = V::select(V::ZERO.less(code), code, V::ZERO);
+    *lowest + *step * V::select(code.less(*top), code, *top)
 }
 
 /// Servos that are computed one after the other.

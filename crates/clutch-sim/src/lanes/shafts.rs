@@ -2,7 +2,8 @@
 
 use super::alike::{Alike, Begin};
 use super::in_steps::InSteps;
-use crate::engine::exact_flow::Bed;
+use super::push::Push;
+use crate::engine::exact_flow::{Bed, Whole};
 use crate::engine::{EngineKind, Event, Shaft};
 use crate::lane::Lane;
 use crate::metrics::Sticks;
@@ -13,6 +14,8 @@ use std::collections::VecDeque;
 pub(super) enum Moves<V: Lane> {
     Exactly {
         bed: Bed<V>,
+        /// Of a whole period.
+        whole: Whole<V>,
         /// Lane by lane.
         alone: Vec<Bed<f64>>,
     },
@@ -23,6 +26,7 @@ pub(super) enum Moves<V: Lane> {
 pub(super) struct Shafts<V: Lane> {
     // Kept from period to period.
     pub(super) plant: Plant<V>,
+    pub(super) push: Push<V>,
     pub(super) drive: V,
     // Changed by each.
     pub(super) moves: Moves<V>,
@@ -50,12 +54,15 @@ impl<V: Lane> Shafts<V> {
         let moves = if alike.engine == EngineKind::ExactFlow {
             let alone: Vec<Bed<f64>> =
                 (0..V::WIDTH).map(|i| Bed::of(&rig(i).model)).collect::<Option<_>>()?;
-            Moves::Exactly { bed: Bed::in_lanes(&alone), alone }
+            let bed = Bed::in_lanes(&alone);
+            Moves::Exactly { whole: bed.whole(V::splat(alike.period)), bed, alone }
         } else {
             Moves::InSteps(InSteps::of(&(0..V::WIDTH).map(at).collect::<Vec<_>>()))
         };
+        let plant = Plant::in_lanes(&|get| V::of(|i| get(&rig(i).model.plant)))?;
         Some(Shafts {
-            plant: Plant::in_lanes(&|get| V::of(|i| get(&rig(i).model.plant)))?,
+            push: Push::of(&plant),
+            plant,
             drive: of(&|(moving, _)| moving.rig().drive.torque(0.0, 0.0) + 0.0),
             moves,
             position: of(&|(moving, _)| moving.shaft().position),

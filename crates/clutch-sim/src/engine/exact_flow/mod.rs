@@ -21,22 +21,28 @@
 //! `φ` never changes its sign: until it stops, if it does, the speed only rises or only falls. There is no balance to step
 //! over. docs/theory.md has the derivation and the errors that were measured.
 
+mod above;
 mod flow;
 mod series;
 mod state;
+mod through;
 
-pub(crate) use flow::{Flow, PIECE_LIMIT, Piece};
+pub(crate) use flow::{Flow, PIECE_LIMIT, Piece, Whole};
 pub(crate) use state::State;
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts};
 use crate::lane::Lane;
 use clutch_core::friction::{Exponential, FrictionModel};
 
-/// Speed, in Stribeck velocities, above which `q` is lost in rounding if `K` times the time left is below 20; else the
-/// logarithm of that product comes on top.
-pub(crate) const LINEAR_ABOVE: f64 = 40.0;
+/// Speed, in Stribeck velocities, above which `q` adds less than 1e-14 of it, if `K` times the time left is 20; else the logarithm
+/// of that over 20 comes on top.
+pub(crate) const LINEAR_ABOVE: f64 = 32.0;
 /// Speed, in Stribeck velocities, above which a motion in lanes goes on alone if the layer reaches as far.
 pub(crate) const HIGHEST_EDGE: f64 = 700.0;
+
+/// Part that a piece may leave out, as a share of what it is: above the layer the speed, of a quadrature the time, of a series the rate
+/// of speed.
+const TOLERANCE: f64 = 1e-10;
 
 /// The fast engine.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,8 +74,10 @@ pub(crate) struct Bed<V: Lane> {
     curve: Exponential<V>,
     /// Coulomb's friction drops from rest to motion; Stribeck's does not.
     drops: V::Mask,
-    /// `J v_s`, kg m² rad/s.
-    unit: V,
+    /// `1/v_s`, s/rad, and `1/(J v_s)`, 1/(kg m² rad/s); `Δμ` times that.
+    per_velocity: V,
+    per_unit: V,
+    drop: V,
     /// `G`, 1/s.
     drag: V,
 }
@@ -113,7 +121,9 @@ impl Bed<f64> {
         Some(Bed {
             curve,
             drops: curve.at_rest < friction.at_rest(),
-            unit: p.inertia * curve.velocity,
+            per_velocity: 1.0 / curve.velocity,
+            per_unit: 1.0 / (p.inertia * curve.velocity),
+            drop: (curve.at_rest - curve.sliding) / (p.inertia * curve.velocity),
             drag: p.viscous_damping / p.inertia,
         })
     }
@@ -130,7 +140,9 @@ impl<V: Lane> Bed<V> {
                 velocity: of(|b| b.curve.velocity),
             },
             drops: V::ZERO.less(of(|b| if b.drops { 1.0 } else { 0.0 })),
-            unit: of(|b| b.unit),
+            per_velocity: of(|b| b.per_velocity),
+            per_unit: of(|b| b.per_unit),
+            drop: of(|b| b.drop),
             drag: of(|b| b.drag),
         }
     }
@@ -141,40 +153,46 @@ impl<V: Lane> Bed<V> {
         self.curve.velocity
     }
 
-    /// The constants of the next `left` seconds, seen along a motion whose sign is `sign` and that begins at `speed`, in
-    /// Stribeck velocities.
+    /// Speed of a velocity along the motion, in Stribeck velocities.
     #[inline(always)]
-    pub(crate) fn flow(&self, pushed: &Pushed<V>, sign: V, speed: V, left: V) -> Flow<V> {
+    pub(crate) fn speed(&self, along: V) -> V {
+        along * self.per_velocity
+    }
+
+    /// What a linear motion takes with it over a whole period.
+    #[inline(always)]
+    pub(crate) fn whole(&self, period: V) -> Whole<V> {
+        Whole::of(self.drag, period)
+    }
+
+    /// The constants of the next `left` seconds, seen along a motion whose sign is `sign`.
+    #[inline(always)]
+    pub(crate) fn flow(&self, pushed: &Pushed<V>, sign: V, left: V) -> Flow<V> {
         let Pushed { torque, normal, holds } = *pushed;
         let Exponential { at_rest, sliding, .. } = self.curve;
-        let stribeck = normal * (at_rest - sliding) / self.unit;
+        let stribeck = normal * self.drop;
         // The number that was compared with.
         let first = V::select(self.drops, normal * at_rest, holds);
         let along = sign * torque;
         let excess = along - first;
         // Without a layer both are one number, rounded once: the break-away that was seen has to happen.
         let even = V::same(stribeck, V::ZERO);
-        let drive = V::select(even, excess, along - normal * sliding) / self.unit;
-        let edge = self.edge(stribeck.abs() * left, (speed, drive), left);
-        Flow { drive, excess, unit: self.unit, drag: self.drag, stribeck, edge }
+        let drive = V::select(even, excess, along - normal * sliding) * self.per_unit;
+        let edge = edge(stribeck.abs() * left);
+        Flow { drive, excess: excess * self.per_unit, drag: self.drag, stribeck, edge }
     }
+}
 
-    /// Speed above which `q` is lost in rounding; `K` times the time left is `lost`. A motion that stays above a higher one
-    /// has that instead, and spares the logarithm.
-    #[inline(always)]
-    fn edge(&self, lost: V, (speed, drive): (V, V), left: V) -> V {
-        let above = V::splat(LINEAR_ABOVE);
-        let near = lost.less(V::splat(20.0));
-        if V::all(near) {
-            return above;
-        }
-        // A tangent of the logarithm, a little above it: ln 20 = 2.9957.
-        let higher = above + V::splat(0.05) * lost + V::splat(2.0);
-        let slowest = speed - V::splat(1.01) * (drive.abs() + self.drag * speed) * left;
-        let stays = higher.less(slowest.min(V::splat(HIGHEST_EDGE)));
-        let edge = if V::all(near | stays) { higher } else { V::select(stays, higher, above + lost.log()) };
-        V::select(near, above, edge)
+/// Speed above which `q` is next to nothing, where `K` times the time left is `lost`.
+#[inline(always)]
+fn edge<V: Lane>(lost: V) -> V {
+    // A tangent of the logarithm is above it.
+    let tangent = V::splat(LINEAR_ABOVE - 1.0) + V::splat(0.05) * lost;
+    let near = lost.less(V::splat(400.0));
+    if V::all(near) {
+        return tangent;
     }
+    V::select(near, tangent, V::splat(LINEAR_ABOVE) + (lost * V::splat(0.05)).log())
 }
 
 impl Bed<f64> {
@@ -210,8 +228,8 @@ impl Bed<f64> {
                 Some((_, end, true)) => Some((State { speed: 0.0, ..end }, true)),
                 Some((flow, at, false)) => flow.run(at, left),
                 None => {
-                    let speed = sign * shaft.velocity / v_s;
-                    self.flow(pushed, sign, speed, left).run(State::at(speed), left)
+                    let speed = self.speed(sign * shaft.velocity);
+                    self.flow(pushed, sign, left).run(State::at(speed), left)
                 }
             };
             let Some((end, stops)) = run else {
