@@ -164,7 +164,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let targets = self.targets(k, shared);
         let (counts, seen) = self.sensors.read(shafts.position);
         shafts.lost |= beyond(seen, targets.position);
-        let (_, commanded) = self.servos.sample(shafts.lost, seen, &targets);
+        let commanded = self.servos.sample(shafts.lost, seen, &targets);
         let target = targets.position * V::splat(1.0 / FIXED) * self.radians_per_count;
         self.sampled.sample(time, target - shafts.position, shafts.velocity, commanded);
         let rests = if k == 0 { V::none() } else { V::same(counts, self.counts) };

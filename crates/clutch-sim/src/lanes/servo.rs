@@ -182,11 +182,11 @@ impl<'a, V: Lane> Servos<'a, V> {
         }
     }
 
-    /// A tick, with the position that is seen, in lanes that are not lost: the law's input, and the voltage that goes out, V.
+    /// A tick, with the position that is seen, in lanes that are not lost: the voltage that goes out, V.
     #[inline(always)]
-    pub(super) fn sample(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
+    pub(super) fn sample(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> V {
         match self {
-            Servos::InLanes(servos) => servos.sample(seen, targets),
+            Servos::InLanes(servos) => servos.sample(seen, targets).1,
             Servos::InTurn(servos) => servos.sample(lost, seen, targets),
         }
     }
@@ -319,8 +319,7 @@ impl<'a> SingleServos<'a> {
 
     // Once, by the instructions of a run alone: nothing of it is in lanes.
     #[inline(never)]
-    fn sample<V: Lane>(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
-        let mut ticks = [Tick::default(); MOST_LANES];
+    fn sample<V: Lane>(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> V {
         let mut volts = [0.0; MOST_LANES];
         for (i, Single { servo, state, map }) in self.lanes.iter_mut().enumerate() {
             if lost >> i & 1 == 1 {
@@ -333,17 +332,9 @@ impl<'a> SingleServos<'a> {
             } else {
                 servo.tick_at(state, position, &target, place)
             };
-            ticks[i] = out.tick;
             volts[i] = if self.whole_codes { servo.dac().volts(out.code) } else { out.command.voltage };
         }
-        let of = |get: fn(&Tick<f64>) -> f64| V::of(|i| get(&ticks[i]));
-        let tick = Tick {
-            error: of(|t| t.error),
-            error_rate: of(|t| t.error_rate),
-            target_velocity: of(|t| t.target_velocity),
-            target_acceleration: of(|t| t.target_acceleration),
-        };
-        (tick, V::of(|i| volts[i]))
+        V::of(|i| volts[i])
     }
 }
 

@@ -9,10 +9,11 @@
 //!
 //! An interval is cut into pieces, each taken by the cheapest way whose estimate of its own error is small enough:
 //!
-//! 1. The motion is linear where `q` is lost in rounding: velocity, position and the instant of leaving the range are in
-//!    closed form; at the fringe of the layer with what `q` does to first order.
-//! 2. In the layer `t = ∫ ds/φ` and `∫ s ds/φ` by quadrature to a speed that the motion with frozen drag gives.
-//! 3. `s`, `φ` and `q` are power series in time where the integrand is too steep, as in a soft break-away; all that the
+//! 1. Far above the layer the motion is linear: speed and way are in closed form; above it, the same with what `q` does to
+//!    third order.
+//! 2. In the layer `t = ∫ ds/φ` and `∫ s ds/φ` by quadrature to a speed that the motion with frozen drag gives; near a
+//!    balance, as in a soft break-away, with the pole of `1/φ` taken off.
+//! 3. `s`, `φ` and `q` are power series in time where the integrand is too steep all the same; all that the
 //!    recurrence of their coefficients needs is one product of two series. The error is relative to the rate even where
 //!    that is nearly nothing: the layer blows it up no more than it blows up the motion. `φ` is carried on as a number
 //!    of its own and not taken anew as a difference of large ones.

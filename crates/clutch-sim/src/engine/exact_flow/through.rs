@@ -8,8 +8,9 @@ use crate::lane::Lane;
 /// Way of a quadrature, in Stribeck velocities, downwards and upwards. Of a fall the integrand has poles at π beside the real axis, of a
 /// rise, whose balance is taken off, at 2π.
 const REACH: (f64, f64) = (6.0, 9.0);
-/// Distance from the balance, in Stribeck velocities, below which its pole is taken off.
-const NEAR: f64 = 3.0;
+/// Distance of a balance, in ways of a quadrature, below which its pole is taken off. Beyond, the points see it well, and the logarithm
+/// that is its integral would lose digits.
+const NEAR: f64 = 2.0;
 /// Time, in the motion's own, that five terms of a series bridge.
 const SHORT: f64 = 0.02;
 /// Points of [`NODES`].
@@ -54,7 +55,7 @@ impl<V: Lane> Flow<V> {
             let better = guess(now - s(0.5) * self.drag * way, slip, rest, limits);
             way = V::select(drags, better, way);
         }
-        let balance = self.balance(now, slip);
+        let balance = self.balance((now, slip), way);
         let rate = |way: V, fall: V| now - self.drag * way - slip * fall;
         let mut ways = [way; POINTS + 1];
         for (to, [node, ..]) in ways.iter_mut().zip(NODES) {
@@ -111,9 +112,9 @@ impl<V: Lane> Flow<V> {
         (fits, stops & !ends, State::select(ends, &ended, &to))
     }
 
-    /// The balance of the motion from a speed at which `φ` is `now` and `q` is `slip`.
+    /// The balance of the motion from a speed at which `φ` is `now` and `q` is `slip`, if it is near on this way.
     #[inline(always)]
-    fn balance(&self, now: V, slip: V) -> Balance<V> {
+    fn balance(&self, (now, slip): (V, V), along: V) -> Balance<V> {
         let s = V::splat;
         let ratio = now / slip;
         let has = s(-0.999).less(ratio) & ratio.less(s(1e3));
@@ -129,7 +130,7 @@ impl<V: Lane> Flow<V> {
         let off = (now - self.drag * way - slip * fall) / (slip * (fall + V::ONE) - self.drag);
         let way = way - off * (V::ONE - s(0.5) * off);
         let drag = self.drag * (way + V::ONE);
-        let has = has & way.abs().less(s(NEAR)) & drag.abs().less(s(0.5) * linear.abs());
+        let has = has & way.abs().less(s(NEAR) * along.abs()) & drag.abs().less(s(0.5) * linear.abs());
         Balance {
             way: V::select(has, way, none.way),
             residue: V::select(has, V::ONE / (linear - drag), none.residue),
