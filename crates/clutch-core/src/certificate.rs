@@ -398,6 +398,28 @@ mod tests {
         assert!((c.error_bound.to_degrees() - (0.1_f64 / 70.0).to_degrees()).abs() < 1e-12);
     }
 
+    /// Of each that a certificate asks for, the very number is enough, and the next below is not.
+    #[test]
+    fn exactly_what_is_required_is_enough() {
+        let of = |p: LawParams, highest: f64| {
+            let output = OutputParams { highest, on_invalid: highest, ..OutputParams::default() };
+            let law = Law::new(&p, &Beside::paper(&PlantParams::default(), &output)).unwrap();
+            certify_alone(&law, &bounds(Tolerances::default()), &at_2_deg_s()).unwrap()
+        };
+        let sign = |kp: f64, highest| {
+            of(LawParams::SmcSign(SmcSignParams { kp, ..SmcSignParams::default() }), highest)
+        };
+        let needed = sign(3.0, 10.0).kp_required;
+        assert_ne!(sign(needed, 10.0).shortfall, Some(Shortfall::Kp));
+        assert_eq!(sign(needed.next_down(), 10.0).shortfall, Some(Shortfall::Kp));
+        assert_ne!(sign(3.0, needed).shortfall, Some(Shortfall::Voltage));
+        assert_eq!(sign(3.0, needed.next_down()).shortfall, Some(Shortfall::Voltage));
+        let damped = |kd: f64| of(LawParams::Smc(SmcParams { kp: 6.0, kd, ..SmcParams::default() }), 10.0);
+        let needed = damped(400.0).kd_required;
+        assert_ne!(damped(needed).shortfall, Some(Shortfall::Kd));
+        assert_eq!(damped(needed.next_down()).shortfall, Some(Shortfall::Kd));
+    }
+
     /// `K_p` against the layer, the bound and the verdict, from 2.2 to 2.3 V.
     #[test]
     fn between_2_2423_and_2_2624_volts_the_layer_grows_without_a_cliff() {

@@ -322,6 +322,19 @@ in_both_scalars! {
         }
     }
 
+    fn a_following_error_of_exactly_the_limit_passes_and_of_the_number_above_it_does_not<T>() {
+        let at = |limit: T| {
+            let mut p = params::<T>();
+            (p.limits.following_error, p.limits.following_time) = (limit, T::ZERO);
+            let mut rig = Rig::with(&p, &paper()).arm();
+            (rig.path, rig.ahead) = ((1000, 0), 40);
+            rig.good()
+        };
+        let error = at(T::from_f64(0.1)).output.unwrap().tick.error.abs();
+        answered(&at(error));
+        faulted(&at(error * (T::ONE - T::from_f64(1e-6))), Cause::FollowingError);
+    }
+
     fn the_200th_period_at_a_limit_of_the_output_ends_control<T>() {
         // 20 counts ahead of the path the law wants 31 V of 10 V; behind it, less than 0 V.
         for (ahead, volts) in [(20, 10.0), (-20, 0.0)] {
