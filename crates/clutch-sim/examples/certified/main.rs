@@ -6,8 +6,8 @@
 //! ```
 //!
 //! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box; `integral`
-//! does so for PI, `shell` for shells, with laws within that do their worst, `rates` for paths up to 100 °/s, `motor` for motor
-//! axes. `campaign` draws sets and shells, too, with tolerances, ripple and noise, and counts broken bounds; `campaign-integral`
+//! does so for PI, `shell` for shells, with laws within that do their worst, `delays` for PD with two and three ticks of delay,
+//! `rates` for paths up to 100 °/s, `motor` for motor axes. `campaign` draws sets and shells, too, with tolerances, ripple and noise, and counts broken bounds; `campaign-integral`
 //! draws PI alone, `campaign-motor` motor axes. Each of the seeds that are given begins a share of the runs; shares can also be
 //! asked for one by one, and run beside each other.
 
@@ -271,6 +271,10 @@ struct Row {
 }
 
 fn measure(scenario: &Scenario, runs: u64) -> Outcome<Row> {
+    measure_with(scenario, runs, &Options::default())
+}
+
+fn measure_with(scenario: &Scenario, runs: u64, options: &Options) -> Outcome<Row> {
     let sampled = scenario.sampled(&scenario.plan()?.bounds);
     let radius = sampled.stability.as_ref().map_or(f64::NAN, largest);
     let refused = sampled.stable() == Some(false) && !sampled.any_law();
@@ -288,7 +292,7 @@ fn measure(scenario: &Scenario, runs: u64) -> Outcome<Row> {
             seconds_per_cell: 0.0,
         });
     }
-    let found = search(&setup, &Options::default(), false);
+    let found = search(&setup, options, false);
     let cells = found.certificate.cells.len() + found.open.len();
     let seconds_per_cell = (cpu_seconds() - began) / cells.max(1) as f64;
     let certified = if found.complete() {
@@ -486,6 +490,24 @@ const INTEGRALS: [(Gains, f64, f64, f64); 8] = [
     (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 1.0, 2.0, 0.0),
 ];
 
+/// PD with two and three ticks of delay on the paper's rig. Delay in ticks, rate in °/s, tolerance of friction in %.
+const DELAYS: [(Gains, f64, f64, f64); 14] = [
+    (Gains::Pd(1660.0, 12.9, 0.712), 2.0, 2.0, 0.0),
+    (Gains::Pd(1660.0, 12.9, 0.712), 2.0, 20.0, 0.0),
+    (Gains::Pd(1660.0, 25.0, 0.7), 2.0, 2.0, 0.0),
+    (Gains::Pd(1250.0, 12.9, 0.7), 2.0, 2.0, 0.0),
+    (Gains::Pd(1250.0, 12.9, 0.5), 2.0, 2.0, 0.0),
+    (Gains::Pd(1000.0, 20.0, 1.0), 2.0, 2.0, 0.0),
+    (Gains::Pd(1000.0, 20.0, 0.7), 2.0, 2.0, 0.0),
+    (Gains::Pd(1000.0, 20.0, 0.7), 2.0, 20.0, 0.0),
+    (Gains::Pd(1000.0, 12.9, 0.5), 2.0, 2.0, 0.0),
+    (Gains::Pd(1000.0, 12.9, 0.5), 2.0, 20.0, 0.0),
+    (Gains::Pd(625.0, 12.9, 0.7), 2.0, 2.0, 0.0),
+    (Gains::Pd(625.0, 12.9, 0.7), 2.0, 20.0, 0.0),
+    (Gains::Pd(1000.0, 20.0, 0.7), 3.0, 2.0, 0.0),
+    (Gains::Pd(625.0, 12.9, 0.7), 3.0, 2.0, 0.0),
+];
+
 /// Fast paths on the paper's rig: delay in ticks, rate in °/s, tolerance of friction in %.
 const RATES: [(Gains, f64, f64, f64); 8] = [
     (Gains::Pd(1660.0, 12.9, 0.712), 0.0, 50.0, 40.0),
@@ -540,6 +562,37 @@ fn sets(sets: &[(Gains, f64, f64, f64)], columns: &str) -> Outcome<()> {
             row.certified.map_or("–".to_owned(), |c| format!("{:.2}", c / row.seen)),
             row.cells,
             row.seconds_per_cell
+        );
+    }
+    Ok(())
+}
+
+/// Those of two and three ticks, and what becomes of an open one with eight times the work.
+fn delays() -> Outcome<()> {
+    println!("| law | delay | °/s | ρ | certified, ° | with eight times the work | seen, ° | ratio |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for (gains, delay, rate, friction) in DELAYS {
+        let keys = [
+            ("rig.delay_ticks", delay),
+            ("reference.ramp.rate_deg_s", rate),
+            ("bounds.friction_percent", friction),
+        ];
+        let scenario = scenario(gains, &keys)?;
+        let row = measure(&scenario, 210)?;
+        let said = |row: &Row| row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}"));
+        let (mut best, mut more) = (row.certified, "–".to_owned());
+        if best.is_none() {
+            let work = 8 * Options::default().work;
+            let again = measure_with(&scenario, 0, &Options { work, ..Options::default() })?;
+            (best, more) = (again.certified, said(&again));
+        }
+        println!(
+            "| {} | {delay} | {rate} | {:.3} | {} | {more} | {:.4} | {} |",
+            gains.title(),
+            row.radius,
+            said(&row),
+            row.seen,
+            best.map_or("–".to_owned(), |c| format!("{:.2}", c / row.seen))
         );
     }
     Ok(())
@@ -672,6 +725,7 @@ fn main() -> Outcome<()> {
         Some("table") => table(&words.next().unwrap_or_default()),
         Some("integral") => sets(&INTEGRALS, "K_p, K_i, K_d, K_Kal"),
         Some("shell") => sets(&SHELLS, "f, S, K_Kal"),
+        Some("delays") => delays(),
         Some("rates") => sets(&RATES, ANY_LAW),
         Some("motor") => sets(&MOTORS, ANY_LAW),
         Some(name @ ("campaign" | "campaign-integral" | "campaign-motor")) => {
@@ -688,8 +742,8 @@ fn main() -> Outcome<()> {
             }
         }
         _ => {
-            let verbs = "table [SET], integral, shell, rates, motor, or campaign, campaign-integral or campaign-motor \
-                 [RUNS [FIRST_SEED …]]";
+            let verbs = "table [SET], integral, shell, delays, rates, motor, or campaign, campaign-integral or \
+                 campaign-motor [RUNS [FIRST_SEED …]]";
             Err(format!("expected {verbs}").into())
         }
     }
