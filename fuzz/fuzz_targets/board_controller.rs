@@ -148,6 +148,9 @@ fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
 
 /// Empties the output, which must be whole frames.
 fn frames(out: &mut Outbox) -> (Vec<u8>, Vec<Message>) {
+    if out.is_empty() {
+        return (Vec::new(), Vec::new());
+    }
     let bytes = out.as_bytes().to_vec();
     out.clear();
     assert!(bytes.last().is_none_or(|end| *end == 0), "cut off");
@@ -218,9 +221,14 @@ impl Bench {
     }
 
     fn asks(&mut self, f: impl Fn(&mut HostNode, &mut Outbox)) {
+        let mut asked = false;
         for chip in [false, true] {
             let mut out = Outbox::default();
             f(if chip { &mut self.chip_host } else { &mut self.host }, &mut out);
+            if out.is_empty() {
+                continue;
+            }
+            asked = true;
             if chip {
                 self.chip.receive(self.now_us, out.as_bytes(), &mut |_| ());
             } else {
@@ -229,7 +237,9 @@ impl Bench {
                 self.board_controller.host(now_ns, out.as_bytes(), host, daq);
             }
         }
-        self.settle();
+        if asked {
+            self.settle();
+        }
     }
 
     /// The output of both goes to its addressee.

@@ -120,6 +120,10 @@ enum Verb {
         /// Watches for panics alone, not for each access of memory: some times as fast.
         #[arg(long)]
         panics: bool,
+        /// Fuzzes nothing: writes the fewest of the inputs kept in target/corpus that reach as much as all of them into
+        /// fuzz/corpus, from which every run begins.
+        #[arg(long)]
+        keep: bool,
     },
     /// Measures the coverage of core and wire by the tests of core, wire and node, and holds it against its floors; writes
     /// the table of docs/proof.md. Installs cargo-llvm-cov.
@@ -292,7 +296,8 @@ fn main() -> Result<()> {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
         }
-        Verb::Fuzz { seconds, executions, target, panics } => {
+        Verb::Fuzz { keep: true, target, .. } => fuzz::keep(target.as_deref()),
+        Verb::Fuzz { seconds, executions, target, panics, keep: false } => {
             let watched = if panics { fuzz::Watched::Panics } else { fuzz::Watched::Memory };
             fuzz::all(watched, seconds, executions, target.as_deref())
         }
@@ -423,7 +428,7 @@ fn certified(runs: u64) -> Result<()> {
     write_between("docs/certified.md", "campaign-integral", &integrals)?;
     let motors = table_of("certified", &["campaign-motor", &runs.to_string(), "300000"])?;
     write_between("docs/certified.md", "campaign-motor", &motors)?;
-    for table in ["integral", "shell", "rates", "motor"] {
+    for table in ["integral", "shell", "delays", "rates", "motor"] {
         write_between("docs/certified.md", table, &table_of("certified", &[table])?)?;
     }
     write_between("docs/certified.md", "part", &table_in("clutch-loop", "part_period", &[])?)?;

@@ -377,7 +377,7 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
     fuzz::build(WATCHED)?;
     tally.stage("fuzzing");
     for (target, runs) in fuzz::TARGETS {
-        let held = fuzz::one(target, WATCHED, &[&format!("-runs={runs}"), "-seed=1", "-verbosity=0"])?;
+        let held = fuzz::one(target, WATCHED, &[], &[&format!("-runs={runs}"), "-seed=1", "-verbosity=0"])?;
         tally.check(&format!("fuzzing {target} with {runs} inputs finds nothing"), held);
     }
     Ok(())
