@@ -78,8 +78,9 @@ fn counted(target: &str, watched: Watched, executions: u64) -> Result<()> {
     if held { Ok(()) } else { bail!("fuzzing {target} found something: see above") }
 }
 
-/// How a target is built to run for long. Half of a board's time goes into telling the fuzzer what numbers it compares, most of
-/// them each byte of a frame with zero; the target makes frames itself, so that they are found without. CI builds all alike, once.
+/// How a target is built to run for long. Half of the time of a board would go into reporting what it compares to the fuzzer,
+/// most of it each byte of a frame with zero; the target makes frames itself, so that they are found without. CI builds all
+/// alike, once.
 fn for_long(target: &str) -> &'static [&'static str] {
     if target == "board_controller" { &["--no-trace-compares"] } else { &[] }
 }
