@@ -5,14 +5,15 @@
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks, a vector each
 //!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run; servos one by one
 //!                                                     │                          where they have no lanes
-//!                                                     └─► quadrature, series     in lanes, the runs in the layer
+//!                                                     └─► above the layer, or    in lanes, the runs that need it, gathered
+//!                                                     │   through it
 //!                                                     └─► Dormand–Prince's steps in lanes, the runs that need them
 //!                                                     └─► what follows a stop    one by one
 //! ```
 //!
 //! Arithmetic, law, output stage, actuator and the pieces of the exact flow are the very functions of one run, over
 //! [`Lane`](crate::lane::Lane) instead of `f64`. Nothing is fused, and nothing is summed across lanes; each elementary function has the bits
-//! of `libm`. A run or a shaft that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again
+//! that it has of one number. A run or a shaft that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again
 //! alone.
 
 mod alike;
