@@ -54,16 +54,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let module: String = std::fs::read(module)?.iter().map(letter).collect();
     let places: Map<String, Value> =
         PLACES.iter().map(|(byte, letter)| (u32::from(*letter).to_string(), json!(byte))).collect();
-    let script = include_str!("../page/page.js").replace("{{places}}", &Value::from(places).to_string());
+    let script =
+        bare(include_str!("../page/page.js")).replace("{{places}}", &Value::from(places).to_string());
     // The module last: nothing is looked for in it.
     let text = include_str!("../page/page.html")
         .replace("{{style}}", include_str!("../page/page.css"))
-        .replace("{{worker}}", include_str!("../page/worker.js"))
+        .replace("{{worker}}", &bare(include_str!("../page/worker.js")))
         .replace("{{script}}", &script)
         .replace("{{declared}}", &declared()?.to_string().replace('<', "\\u003c"))
         .replace("{{module}}", &module);
     std::fs::write(page, text)?;
     Ok(())
+}
+
+/// A script, whose strings end on their lines, without its indents and lines of comment: who loads the page does not read them.
+fn bare(script: &str) -> String {
+    let lines = script.lines().map(str::trim_start);
+    lines.filter(|line| !line.starts_with("//")).flat_map(|line| [line, "\n"]).collect()
 }
 
 fn declared() -> Result<Value, String> {

@@ -1,8 +1,8 @@
 //! A piece of the motion above the layer, where `q` is little beside the rest.
 
-use super::TOLERANCE;
 use super::flow::{Flow, SLOW};
 use super::state::State;
+use super::tolerance::TOLERANCE;
 use crate::lane::Lane;
 
 /// Speed down to which a motion is brought by such a piece, in Stribeck velocities, where `K` is below the rate of speed. With

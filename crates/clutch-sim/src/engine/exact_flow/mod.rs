@@ -27,6 +27,7 @@ mod flow;
 mod series;
 mod state;
 mod through;
+mod tolerance;
 
 pub(crate) use flow::{Flow, PIECE_LIMIT, Piece, Whole};
 pub(crate) use state::State;
@@ -40,10 +41,6 @@ use clutch_core::friction::{Exponential, FrictionModel};
 pub(crate) const LINEAR_ABOVE: f64 = 32.0;
 /// Speed, in Stribeck velocities, above which a motion in lanes goes on alone if the layer reaches as far.
 pub(crate) const HIGHEST_EDGE: f64 = 700.0;
-
-/// Part that a piece may leave out, as a share of what it is: above the layer the speed, of a quadrature the time, of a series the rate
-/// of speed.
-const TOLERANCE: f64 = 1e-10;
 
 /// The fast engine.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,7 +1,7 @@
 //! A piece of the motion as power series in time.
 
-use super::TOLERANCE;
 use super::state::State;
+use super::tolerance::TOLERANCE;
 
 /// Terms of a power series.
 const TERMS: usize = 18;
@@ -41,27 +41,28 @@ pub(super) fn step(at: &State<f64>, now: f64, slip: f64, drag: f64, rest: f64) -
             step = libm::pow(allowed / last, INVERSE[n]);
         }
     }
-    let mut time = if step >= end { rest } else { step / unit };
-    let speed = |t: f64| at.speed + t * horner(t, |n| rate[n] * INVERSE[n + 1]);
+    // ṡ = φ, so s and ∫ s dt have the coefficients of φ, divided once and twice.
+    let once: [f64; TERMS] = std::array::from_fn(|n| rate[n] * INVERSE[n + 1]);
+    let twice: [f64; TERMS] = std::array::from_fn(|n| once[n] * INVERSE[n + 2]);
+    let speed = |t: f64| at.speed + t * horner(t, &once);
     let stops = rate[0] < 0.0 && speed(step) <= 0.0;
     if stops {
-        step = instant(speed, |t| horner(t, |n| rate[n]), step);
-        time = if step >= end { rest } else { step / unit };
+        step = instant(speed, |t| horner(t, &rate), step);
     }
-    // ṡ = φ, so s and ∫ s dt have the coefficients of φ, divided once and twice.
-    let way = at.speed * step + step * step * horner(step, |n| rate[n] * INVERSE[n + 1] * INVERSE[n + 2]);
+    let time = if step >= end { rest } else { step / unit };
+    let way = at.speed * step + step * step * horner(step, &twice);
     let to = State {
         time: at.time + time,
         speed: speed(step),
-        rate: horner(step, |n| rate[n]) * unit,
+        rate: horner(step, &rate) * unit,
         way: at.way + way / unit,
     };
     (stops, to)
 }
 
 /// The sum of a series at `t`.
-fn horner(t: f64, coefficient: impl Fn(usize) -> f64) -> f64 {
-    (0..TERMS).rev().fold(0.0, |sum, n| sum * t + coefficient(n))
+fn horner(t: f64, coefficients: &[f64; TERMS]) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
 }
 
 /// The instant at which a falling speed is 0, within `(0, beyond]`: Newton's method, halving where it would leave the

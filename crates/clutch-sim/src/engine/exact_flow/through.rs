@@ -1,8 +1,8 @@
 //! A piece of the motion through the layer, by quadrature in speed.
 
-use super::TOLERANCE;
 use super::flow::Flow;
 use super::state::State;
+use super::tolerance::TOLERANCE;
 use crate::lane::Lane;
 
 /// Way of a quadrature, in Stribeck velocities, downwards and upwards. Of a fall the integrand has poles at π beside the real axis, of a
@@ -13,23 +13,17 @@ const REACH: (f64, f64) = (6.0, 9.0);
 const NEAR: f64 = 2.0;
 /// Time, in the motion's own, that five terms of a series bridge.
 const SHORT: f64 = 0.02;
-/// Points of [`NODES`].
+/// Gauss and Legendre's points.
 const POINTS: usize = 12;
-/// Gauss and Legendre's points on [0, 1]: place, weight, and the weights that give the tenth and the eleventh
-/// coefficient of a series in Legendre's polynomials.
-const NODES: [[f64; 4]; POINTS] = [
+/// The lower half of them on [0, 1]: place, weight, and the weights that give the tenth and the eleventh
+/// coefficient of a series in Legendre's polynomials. The upper half is its mirror, the last column with the other sign.
+const NODES: [[f64; 4]; POINTS / 2] = [
     [0.009219682876640375, 0.023587668193255914, 0.10544099839163595, -0.05626855563529156],
     [0.04794137181476257, 0.05346966299765921, -0.3268652502223004, 0.18937270565563258],
     [0.11504866290284765, 0.08003916427167311, 0.5086168908165707, -0.34604162358432194],
     [0.2063410228566913, 0.10158371336153296, -0.554368149850446, 0.49442267934928263],
     [0.3160842505009099, 0.1167462682691774, 0.4276380562250802, -0.608976901663329],
     [0.43738329574426554, 0.12457352290670139, -0.1604625453605404, 0.6711612378327249],
-    [0.5626167042557345, 0.12457352290670139, -0.1604625453605404, -0.6711612378327249],
-    [0.6839157494990901, 0.1167462682691774, 0.4276380562250802, 0.608976901663329],
-    [0.7936589771433087, 0.10158371336153296, -0.554368149850446, -0.49442267934928263],
-    [0.8849513370971523, 0.08003916427167311, 0.5086168908165707, 0.34604162358432194],
-    [0.9520586281852375, 0.05346966299765921, -0.3268652502223004, -0.18937270565563258],
-    [0.9907803171233597, 0.023587668193255914, 0.10544099839163595, 0.05626855563529156],
 ];
 
 /// A zero of `φ`, which no motion passes, on the way from a speed. `1/φ` has a pole there.
@@ -43,33 +37,41 @@ struct Balance<V> {
 impl<V: Lane> Flow<V> {
     /// The inside of the layer: `t = ∫ ds/φ` and `∫ s ds/φ` from the speed now to one that is guessed. The rest of
     /// the time, a little before or behind the end, is a short series of known terms. Masks: where the state is the one after
-    /// it, and where it stops there. Not where the integrand is too steep for [`NODES`].
+    /// it, and where it stops there. Not where the integrand is too steep for [`POINTS`].
     #[inline(always)]
     pub(super) fn through(&self, at: &State<V>, now: V, slip: V, rest: V) -> (V::Mask, V::Mask, State<V>) {
         let s = V::splat;
         let limits = (-at.speed.min(s(REACH.0)), s(REACH.1));
         // With the drag as it is now, and then as it is half-way, the motion is in closed form.
-        let mut way = guess(now, slip, rest, limits);
-        let drags = s(1e-3).less(self.drag * rest) & limits.0.less(way) & way.less(limits.1);
-        if V::any(drags) {
-            let better = guess(now - s(0.5) * self.drag * way, slip, rest, limits);
-            way = V::select(drags, better, way);
+        let (mut way, mut asks) = (V::ZERO, !V::none());
+        for _ in 0..2 {
+            let closer = guess(now - s(0.5) * self.drag * way, slip, rest, limits);
+            way = V::select(asks, closer, way);
+            asks = s(1e-3).less(self.drag * rest) & limits.0.less(way) & way.less(limits.1);
+            if !V::any(asks) {
+                break;
+            }
         }
         let balance = self.balance((now, slip), way);
         let rate = |way: V, fall: V| now - self.drag * way - slip * fall;
         let mut ways = [way; POINTS + 1];
-        for (to, [node, ..]) in ways.iter_mut().zip(NODES) {
-            *to = s(node) * way;
+        for (i, [node, ..]) in NODES.into_iter().enumerate() {
+            ways[i] = s(node) * way;
+            ways[POINTS - 1 - i] = way - ways[i];
         }
         let falls = V::near_falls(ways);
         let (mut time, mut moment, mut even, mut odd) = (V::ZERO, V::ZERO, V::ZERO, V::ZERO);
-        for (i, [_, weight, tenth, eleventh]) in NODES.into_iter().enumerate() {
+        let part = |i: usize| {
             let (rate, from) = (rate(ways[i], falls[i]), ways[i] - balance.way);
-            let part = (from - balance.residue * rate) / (rate * from);
-            time = time + s(weight) * part;
-            moment = moment + s(weight) * part * ways[i];
-            even = even + s(tenth) * part;
-            odd = odd + s(eleventh) * part;
+            (from - balance.residue * rate) / (rate * from)
+        };
+        for (i, [_, weight, tenth, eleventh]) in NODES.into_iter().enumerate() {
+            let mirror = POINTS - 1 - i;
+            let (low, high) = (part(i), part(mirror));
+            time = time + s(weight) * (low + high);
+            moment = moment + s(weight) * (low * ways[i] + high * ways[mirror]);
+            even = even + s(tenth) * (low + high);
+            odd = odd + s(eleventh) * (low - high);
         }
         // ∫ dw/(w − w*)
         let pole = balance.residue * (-way / balance.way).near_log1p();
