@@ -2,8 +2,9 @@
 //! them. Nothing panics or overflows; all output is whole frames; a code fits the converter; and a
 //! clock that has just been read is not requested again at once.
 //!
-//! The input plans a run (law, safe state, path, a few numbers changed) and then acts: orderly
-//! steps, so that a run is reached, between bytes and well-formed frames of any content.
+//! The input plans a run (law, safe state, path, a few numbers changed; controller and board apart,
+//! or on one chip) and then acts: orderly steps, so that a run is reached, between bytes and
+//! well-formed frames of any content.
 #![no_main]
 
 use clutch_core::law::LawParams;
@@ -80,8 +81,16 @@ impl Input<'_> {
     }
 }
 
-/// The settings of a run, and the run that they build.
-fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
+/// What an input begins with.
+struct Plan {
+    settings: Settings,
+    /// What the settings build.
+    built: Built,
+    /// Controller and board are one chip.
+    one_chip: bool,
+}
+
+fn plan(input: &mut Input<'_>) -> Option<Plan> {
     let [kinds, path, host_silence] = input.take();
     let laws = LawParams::all();
     // By the two bits that have always chosen, and a third.
@@ -143,7 +152,7 @@ fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
     for tick in [0, 1, 1000, u64::from(u32::MAX), u64::MAX] {
         let _ = built.path.target(settings.knots(), tick);
     }
-    Some((settings, built))
+    Some(Plan { settings, built, one_chip: kinds & 1 << 5 != 0 })
 }
 
 /// Empties the output, which must be whole frames.
@@ -160,8 +169,7 @@ fn frames(out: &mut Outbox) -> (Vec<u8>, Vec<Message>) {
 }
 
 struct Bench {
-    settings: Settings,
-    built: Built,
+    plan: Plan,
     host: HostNode,
     board_controller: BoardController,
     lines: Lines,
@@ -169,7 +177,6 @@ struct Bench {
     to_board: Decoder,
     up: Outbox,
     chip: OneChip,
-    chip_host: HostNode,
     now_us: u64,
     counts: i32,
     /// The highest code of the run's converter.
@@ -177,7 +184,8 @@ struct Bench {
 }
 
 impl Bench {
-    fn new((settings, built): (Settings, Built)) -> Bench {
+    fn new(plan: Plan) -> Bench {
+        let built = &plan.built;
         let times = &built.times;
         let params = ControllerParams {
             run: 5,
@@ -188,14 +196,11 @@ impl Bench {
             silence: times.silence,
         };
         let configure = ControllerNode::new(params, built.servo, built.supervisor).configuration();
-        let host = HostNode::new(built.servo, configure, 20_000_000, 200_000_000);
         let this = BoardControllerParams { board: 1, boot: 1, clock_hz: 1 };
         Bench {
             top: built.servo.dac().code(f32::INFINITY).0,
-            settings,
-            built,
-            chip_host: host.clone(),
-            host,
+            host: HostNode::new(built.servo, configure, 20_000_000, 200_000_000),
+            plan,
             board_controller: BoardController::new(this),
             lines: Lines::default(),
             board: BoardNode::new(&BOARD).expect("a board"),
@@ -211,42 +216,49 @@ impl Bench {
         self.now_us.saturating_mul(1000)
     }
 
-    /// Bytes from the host, to both.
+    /// Bytes from the host.
     fn host(&mut self, bytes: &[u8]) {
+        if self.plan.one_chip {
+            self.chip.receive(self.now_us, bytes, &mut |_| ());
+        } else {
+            let now_ns = self.now_ns();
+            let Lines { host, daq, .. } = &mut self.lines;
+            self.board_controller.host(now_ns, bytes, host, daq);
+        }
+        self.settle();
+    }
+
+    /// Bytes from the board, where it is none of the controller's own chip.
+    fn daq(&mut self, bytes: &[u8]) {
+        if self.plan.one_chip {
+            return;
+        }
         let now_ns = self.now_ns();
-        let Lines { host, daq, .. } = &mut self.lines;
-        self.board_controller.host(now_ns, bytes, host, daq);
-        self.chip.receive(self.now_us, bytes, &mut |_| ());
+        let Lines { host, daq, from_daq } = &mut self.lines;
+        self.board_controller.daq(now_ns, from_daq, bytes, host, daq);
         self.settle();
     }
 
     fn asks(&mut self, f: impl Fn(&mut HostNode, &mut Outbox)) {
-        let mut asked = false;
-        for chip in [false, true] {
-            let mut out = Outbox::default();
-            f(if chip { &mut self.chip_host } else { &mut self.host }, &mut out);
-            if out.is_empty() {
-                continue;
-            }
-            asked = true;
-            if chip {
-                self.chip.receive(self.now_us, out.as_bytes(), &mut |_| ());
-            } else {
-                let now_ns = self.now_ns();
-                let Lines { host, daq, .. } = &mut self.lines;
-                self.board_controller.host(now_ns, out.as_bytes(), host, daq);
-            }
-        }
-        if asked {
-            self.settle();
+        let mut out = Outbox::default();
+        f(&mut self.host, &mut out);
+        if !out.is_empty() {
+            self.host(out.as_bytes());
         }
     }
 
-    /// The output of both goes to its addressee.
+    /// All output goes to its addressee.
     fn settle(&mut self) {
         let now_ns = self.now_ns();
-        let (path, knots) = (&self.built.path, self.settings.knots());
+        let (path, knots) = (&self.plan.built.path, self.plan.settings.knots());
         let at = |tick| path.target(knots, tick);
+        if self.plan.one_chip {
+            let (bytes, _) = frames(self.chip.outbox());
+            self.host.receive(now_ns, &bytes, &at, &mut |_| ());
+            let code = self.chip.code();
+            assert!(code.0 < 1 << BOARD.dac_bits, "{code:?}");
+            return;
+        }
         for _ in 0..4 {
             let (bytes, messages) = frames(&mut self.lines.daq);
             for message in messages {
@@ -263,15 +275,12 @@ impl Bench {
             }
             let (bytes, _) = frames(&mut self.lines.host);
             self.host.receive(now_ns, &bytes, &at, &mut |_| ());
-            let (bytes, _) = frames(self.chip.outbox());
-            self.chip_host.receive(now_ns, &bytes, &at, &mut |_| ());
             if self.lines.daq.is_empty() {
                 break;
             }
         }
-        for code in [self.board.code(), self.chip.code()] {
-            assert!(code.0 < 1 << BOARD.dac_bits, "{code:?}");
-        }
+        let code = self.board.code();
+        assert!(code.0 < 1 << BOARD.dac_bits, "{code:?}");
         let word = self.board_controller.last_word().map(|mut word| frames(&mut word).1.len());
         assert_eq!(word, self.board_controller.driving().then_some(1));
     }
@@ -288,33 +297,42 @@ impl Bench {
     /// As for boards whose host sleeps.
     fn boards_pass(&mut self, us: u64) {
         self.now_us = self.now_us.saturating_add(us);
-        let now_ns = self.now_ns();
-        let Lines { host, daq, .. } = &mut self.lines;
-        self.board_controller.poll(now_ns, host, daq);
-        // At the end of all times there is no later.
-        assert!(self.board_controller.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
-        self.board.poll(self.now_us as u32, &mut self.up);
-        self.chip.poll(self.now_us, &mut |_| ());
+        if self.plan.one_chip {
+            self.chip.poll(self.now_us, &mut |_| ());
+        } else {
+            let now_ns = self.now_ns();
+            let Lines { host, daq, .. } = &mut self.lines;
+            self.board_controller.poll(now_ns, host, daq);
+            // At the end of all times there is no later.
+            assert!(self.board_controller.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
+            self.board.poll(self.now_us as u32, &mut self.up);
+        }
         self.settle();
     }
 
     fn samples(&mut self, moved: i32, faults: u8) {
         self.counts = self.counts.wrapping_add(moved);
         let (counts, encoder, converter) = (Counts(self.counts), faults & 1 != 0, faults & 2 != 0);
-        self.board.sample(self.now_us as u32, counts, encoder, converter, &mut self.up);
-        let mut out = None;
-        self.chip.sample(self.now_us, counts, encoder, converter, &mut |code| out = Some(code));
-        assert_eq!(out, Some(self.chip.code()));
-        if faults & 4 != 0 {
-            self.up.clear(); // lost
+        let took = Micros(u32::from(faults) * 10);
+        if self.plan.one_chip {
+            let mut out = None;
+            self.chip.sample(self.now_us, counts, encoder, converter, &mut |code| out = Some(code));
+            assert_eq!(out, Some(self.chip.code()));
+        } else {
+            self.board.sample(self.now_us as u32, counts, encoder, converter, &mut self.up);
+            if faults & 4 != 0 {
+                self.up.clear(); // lost
+            }
         }
         if faults & 8 == 0 {
             self.settle(); // else it waits for the next
         }
-        let took = Micros(u32::from(faults) * 10);
-        self.board_controller.spent(u32::from(faults));
-        self.board_controller.answered(took);
-        self.chip.answered(0, took);
+        if self.plan.one_chip {
+            self.chip.answered(0, took);
+        } else {
+            self.board_controller.spent(u32::from(faults));
+            self.board_controller.answered(took);
+        }
     }
 
     fn acts(&mut self, input: &mut Input<'_>) {
@@ -322,7 +340,7 @@ impl Bench {
             0 => self.asks(|host, out| host.discover(1, out)),
             1 => {
                 let mut all = Vec::new();
-                self.settings.each(|key, value| all.push((key, value)));
+                self.plan.settings.each(|key, value| all.push((key, value)));
                 // The answers to so many have room.
                 for some in all.chunks(20) {
                     self.asks(|host, out| some.iter().for_each(|(key, value)| host.set(*key, *value, out)));
@@ -364,14 +382,11 @@ impl Bench {
             }
             12 => {
                 let frame = input.frame();
-                let now_ns = self.now_ns();
-                let Lines { host, daq, from_daq } = &mut self.lines;
-                self.board_controller.daq(now_ns, from_daq, &frame, host, daq);
-                self.settle();
+                self.daq(&frame);
             }
             13 => {
                 let frame = input.frame();
-                let (path, knots) = (&self.built.path, self.settings.knots());
+                let (path, knots) = (&self.plan.built.path, self.plan.settings.knots());
                 let at = |tick| path.target(knots, tick);
                 self.host.receive(self.now_us.saturating_mul(1000), &frame, &at, &mut |_| ());
             }
@@ -379,10 +394,7 @@ impl Bench {
                 let length = usize::from(input.byte());
                 let bytes = input.some(length);
                 self.host(&bytes);
-                let now_ns = self.now_ns();
-                let Lines { host, daq, from_daq } = &mut self.lines;
-                self.board_controller.daq(now_ns, from_daq, &bytes, host, daq);
-                self.settle();
+                self.daq(&bytes);
             }
             _ => {
                 let setting = (u16::from_le_bytes(input.take()), u64::from_le_bytes(input.take()));

@@ -42,13 +42,21 @@ impl Watched {
     }
 }
 
-/// Fuzzes every target, or only one, for `seconds` each; or for so many executions, reported in docs/proof.md.
-pub(crate) fn all(watched: Watched, seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
+/// Fuzzes every target, or only one, for `seconds` each; or for so many executions, reported in docs/proof.md. No input is
+/// above `longest` bytes.
+pub(crate) fn all(
+    watched: Watched,
+    seconds: u32,
+    executions: Option<u64>,
+    only: Option<&str>,
+    longest: Option<u32>,
+) -> Result<()> {
     install()?;
+    let time = format!("-max_total_time={seconds}");
     for (target, _) in TARGETS.iter().filter(|(t, _)| only.is_none_or(|o| o == *t)) {
         match executions {
-            None if one(target, watched, for_long(target), &[&format!("-max_total_time={seconds}")])? => {}
-            Some(executions) => counted(target, watched, executions)?,
+            None if one(target, watched, for_long(target), &[&time, &length(longest)])? => {}
+            Some(executions) => counted(target, watched, executions, longest)?,
             None => bail!("fuzzing {target} found something: see above"),
         }
     }
@@ -56,26 +64,34 @@ pub(crate) fn all(watched: Watched, seconds: u32, executions: Option<u64>, only:
 }
 
 /// Fuzzes one target in steps, so that a run that is ended early has reported what it did.
-fn counted(target: &str, watched: Watched, executions: u64) -> Result<()> {
+fn counted(target: &str, watched: Watched, executions: u64, longest: Option<u32>) -> Result<()> {
     const STEP: u64 = 10_000_000;
     let (begun, mut done) = (Instant::now(), 0);
     let mut held = true;
     while held && done < executions {
         let step = STEP.min(executions - done);
-        held = one(target, watched, for_long(target), &[&format!("-runs={step}")])?;
+        held = one(target, watched, for_long(target), &[&format!("-runs={step}"), &length(longest)])?;
         done += step;
         println!("{target}: {done} executions, {} s", begun.elapsed().as_secs());
     }
     let corpus = std::fs::read_dir(root().join("target/corpus").join(target))?.count();
     let found = if held { "nothing" } else { "an input: see target/" };
     let seconds = begun.elapsed().as_secs();
-    let watched = watched.name();
+    let watched = match longest {
+        Some(bytes) => format!("{}; inputs up to {bytes} bytes", watched.name()),
+        None => watched.name().to_string(),
+    };
     let row = format!(
         "| `{target}` | {watched} | {} | {seconds} s | {corpus} | {found} |",
         grouped(&done.to_string())
     );
     add_row("fuzz", &row)?;
     if held { Ok(()) } else { bail!("fuzzing {target} found something: see above") }
+}
+
+/// The longest input, as an option of libFuzzer, which chooses one itself for 0.
+fn length(longest: Option<u32>) -> String {
+    format!("-max_len={}", longest.unwrap_or(0))
 }
 
 /// How a target is built to run for long. Half of the time of a board would go into reporting what it compares to the fuzzer,

@@ -120,6 +120,9 @@ enum Verb {
         /// Watches for panics alone, not for each access of memory: some times as fast.
         #[arg(long)]
         panics: bool,
+        /// Inputs of this many bytes at most; else libFuzzer chooses, by the longest of the kept ones.
+        #[arg(long)]
+        longest: Option<u32>,
         /// Fuzzes nothing: writes the fewest of the inputs kept in target/corpus that reach as much as all of them into
         /// fuzz/corpus, from which every run begins.
         #[arg(long)]
@@ -297,9 +300,9 @@ fn main() -> Result<()> {
             cargo(example).args(rest).run()
         }
         Verb::Fuzz { keep: true, target, .. } => fuzz::keep(target.as_deref()),
-        Verb::Fuzz { seconds, executions, target, panics, keep: false } => {
+        Verb::Fuzz { seconds, executions, target, panics, longest, keep: false } => {
             let watched = if panics { fuzz::Watched::Panics } else { fuzz::Watched::Memory };
-            fuzz::all(watched, seconds, executions, target.as_deref())
+            fuzz::all(watched, seconds, executions, target.as_deref(), longest)
         }
         Verb::Coverage => coverage::run(),
         Verb::Prove { names } => proof::prove(&names),
