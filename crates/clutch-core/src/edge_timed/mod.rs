@@ -568,20 +568,21 @@ impl<T: Real> EdgeTimed<T> {
         state.phase = Phase::Resting;
     }
 
-    /// The state of a filter that knows friction along the disc but for its mean, where `other` knows nothing of the disc.
+    /// The state of a filter that knows friction along the disc but for its mean, where `other` knows nothing of the disc: what is
+    /// here friction is there the mean times the map's, with its variance and what goes with it.
+    #[inline(never)] // of a name, for a board has no map
     pub(crate) fn known_from(&self, other: &EdgeTimedState<T>, place: &Place<T>) -> EdgeTimedState<T> {
         let mut state = *other;
-        let friction = other.belief.friction.level() / place.friction(other.belief.motion.position);
+        let per = T::ONE / place.friction(other.belief.motion.position);
+        let mean = other.belief.friction.level() * per;
         for known in [&mut state.belief.friction, &mut state.at_edge] {
-            known.hh += known.rr;
-            known.mean = friction;
-            known.hs = T::ZERO;
-            known.know(friction, self.ripple * friction);
+            *known = Friction { mean, hh: known.variance() * (per * per), ..Friction::default() };
+            known.know(mean, self.ripple * mean);
             known.ss = known.rr * self.wave * self.wave;
         }
         let belief = &mut state.belief;
-        (belief.th, belief.tr, belief.ts) = (T::ZERO, T::ZERO, T::ZERO);
-        (belief.wh, belief.wr, belief.ws) = (T::ZERO, T::ZERO, T::ZERO);
+        (belief.th, belief.tr, belief.ts) = ((belief.th + belief.tr) * per, T::ZERO, T::ZERO);
+        (belief.wh, belief.wr, belief.ws) = ((belief.wh + belief.wr) * per, T::ZERO, T::ZERO);
         state
     }
 

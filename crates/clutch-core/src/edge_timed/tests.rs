@@ -442,16 +442,22 @@ fn a_filter_that_gets_a_map_keeps_the_friction_here_and_makes_it_the_mean_of_the
     let friction = &mut state.belief.friction;
     (friction.mean, friction.ripple, friction.slope) = (1.1, 0.1, 0.05);
     (friction.hr, friction.hs) = (0.01, 0.02);
-    state.belief.th = 0.03;
+    (state.belief.th, state.belief.tr, state.belief.wh, state.belief.wr) = (0.03, 0.01, -0.02, 0.05);
     let known = f.known_from(&state, &rising(92)).belief;
     // 1.2 of the model's friction where the disc has 0.77 of its mean.
     assert!(near(known.friction.mean, 1.2 / rise(92.5)), "{}", known.friction.mean);
-    assert!(near(known.friction.hh, 0.0625 + 0.0225), "what the ripple was in doubt by is the mean's now");
+    let variance = (0.0625 + 0.02 + 0.0225) / rise(92.5).powi(2);
+    assert!(
+        near(known.friction.hh, variance),
+        "what mean and ripple together were in doubt by is the mean's now"
+    );
+    assert!(near(known.th, 0.04 / rise(92.5)) && near(known.wh, 0.03 / rise(92.5)), "and what goes with it");
     let left = 0.15 * 1.2 / rise(92.5);
     let wave = 340.0 / 20_000.0 * core::f64::consts::TAU;
     assert!(near(known.friction.rr, left * left) && near(known.friction.ss, left * left * wave * wave));
     assert_eq!((known.friction.ripple, known.friction.slope), (0.0, 0.0));
-    assert_eq!((known.friction.hr, known.friction.hs, known.th), (0.0, 0.0, 0.0));
+    assert_eq!((known.friction.hr, known.friction.hs), (0.0, 0.0));
+    assert_eq!((known.tr, known.ts, known.wr, known.ws), (0.0, 0.0, 0.0, 0.0));
     assert_eq!((known.motion, known.tt), (state.belief.motion, state.belief.tt));
 }
 
