@@ -92,6 +92,11 @@ def test_an_engine_that_gives_no_trajectory_is_told_so():
         referee.compare([CASES["C1"]], [Five()])
 
 
+def test_an_engine_that_this_package_does_not_have_is_refused_by_its_name():
+    with pytest.raises(ValueError, match=r"^name = 'nosuch': expected one of system, bristled_system, .*, bristle$"):
+        referee.Own("nosuch")
+
+
 def test_an_engine_that_does_not_take_a_case_says_why():
     assert "bristles" in MuJoCo().refuses(CASES["L1"])
     assert "scenario" in MuJoCo().refuses(CASES["A3_pd"])

@@ -13,10 +13,26 @@ from clutch.referee._case import Case, Engine, Figure, Trajectory
 __all__ = ["Own", "Score", "about", "compare", "others", "own", "table"]
 
 
+ENGINES = ("system", "bristled_system", "dormand_prince", "exact_flow", "bristle")
+
+
 class Own:
-    """An engine of this package."""
+    """An engine of this package.
+
+    Parameters
+    ----------
+    name
+        Its name, as :func:`own` has it.
+
+    Raises
+    ------
+    ValueError
+        This package has no such engine.
+    """
 
     def __init__(self, name: str) -> None:
+        if name not in ENGINES:
+            raise ValueError(f"name = {name!r}: expected one of {', '.join(ENGINES)}")
         self.name = name
         self.about = "this package"
 
@@ -35,7 +51,7 @@ class Own:
 
 def own() -> list[Engine]:
     """The engines of this package."""
-    return [Own(name) for name in ("system", "bristled_system", "dormand_prince", "exact_flow", "bristle")]
+    return [Own(name) for name in ENGINES]
 
 
 def others() -> list[Engine]:
